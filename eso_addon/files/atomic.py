@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Output files that appear whole or not at all."""
+
+import os
+import shutil
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+
+@contextmanager
+def atomic_output(target: str | os.PathLike[str]) -> Iterator[Path]:
+    """Give a path to write to, and put what was written in the target's place once the block has ended well.
+
+    Parameters
+    ----------
+    target
+        The file to write; one that exists is replaced at the end, in one step.
+
+    Yields
+    ------
+    Path
+        A path with the target's name in a temporary folder beside it. Files that are written next to it (an .mtl,
+        a .bin) move with it, before it.
+
+    Raises
+    ------
+    OSError
+        If the target's folder does not exist, the target is a folder, or nothing was written.
+
+    Notes
+    -----
+    After an exception the temporary folder is gone and the target is as it was.
+    """
+    target = Path(target).absolute()
+    if not target.parent.is_dir():
+        raise FileNotFoundError(f"cannot write {target.name}: the folder {target.parent} does not exist")
+    if target.is_dir():
+        raise IsADirectoryError(f"cannot write {target}: it is a folder; give the name of a file")
+    # The temporary folder is a sibling of the target because a replacement is one step only within a file system.
+    folder = Path(tempfile.mkdtemp(prefix=".eso_lod_", dir=target.parent))
+    try:
+        draft = folder / target.name
+        yield draft
+        if not draft.is_file():
+            raise OSError(f"cannot write {target}: nothing was written")
+        for companion in folder.iterdir():
+            if companion != draft:
+                os.replace(companion, target.parent / companion.name)
+        os.replace(draft, target)
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
