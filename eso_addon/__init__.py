@@ -66,11 +66,14 @@ def register() -> None:
 
     for part in _BLENDER_PARTS:
         import_module(f".{part}", __name__).register()
-    # A terminal's command is no use inside the bpy wheel, which lacks the call in some versions.
     if hasattr(bpy.utils, "register_cli_command"):
-        from .cli import main
+        _command_handles.append(bpy.utils.register_cli_command(_COMMAND, _run_command))
 
-        _command_handles.append(bpy.utils.register_cli_command(_COMMAND, main))
+
+def _run_command(argv: list[str]) -> int:
+    from .cli import main
+
+    return main(argv)
 
 
 def unregister() -> None:

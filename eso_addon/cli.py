@@ -1,0 +1,363 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The command line: `python -m eso_addon WORD …` and `blender --command eso_lod WORD …`."""
+
+import argparse
+import json
+import sys
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
+
+from .settings.profiles import PROFILES
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from .core.deviation import Deviation
+    from .core.simplify import SimplifyResult
+
+    Part = tuple[str, NDArray[np.float64], NDArray[np.int64]]
+
+FORMATS = (".blend", ".fbx", ".glb", ".gltf", ".obj", ".off", ".ply", ".stl")
+METHODS = ("eso", "so", "cf", "qem")
+_ENGINE_WORDS = ("method", "rings", "preset", "placement", "prune", "weld")
+
+
+class Model(Protocol):
+    """A file of meshes: what is in it, and how simplified versions leave it."""
+
+    @property
+    def parts(self) -> "list[Part]":
+        """Name, vertices and triangles of each mesh."""
+
+    @property
+    def left_behind(self) -> list[str]:
+        """What simplified versions lose."""
+
+    def write_simplified(self, path: Path, results: "Sequence[SimplifyResult]") -> list[Path]:
+        """Write one result for each part; give the files written."""
+
+    def write_levels(
+        self, path: Path, levels: "Sequence[Sequence[SimplifyResult]]", name_level: Callable[[str, int], str]
+    ) -> list[Path]:
+        """Write all levels, each with one result for each part; give the files written."""
+
+
+class OffModel:
+    """An .off file on its way to another: no Blender needed."""
+
+    left_behind: list[str] = []  # noqa: RUF012 - never written to
+
+    def __init__(self, path: Path) -> None:
+        from .files.off import FileFormatError, read_off
+
+        self.parts = [(path.stem, *read_off(path))]
+        if not len(self.parts[0][2]):
+            raise FileFormatError(f"{path.name} has no mesh with faces: nothing to work on")
+
+    def write_simplified(self, path: Path, results: "Sequence[SimplifyResult]") -> list[Path]:
+        """Write the one result."""
+        from .files.off import write_off
+
+        write_off(path, results[0].vertices, results[0].faces)
+        return [path]
+
+    def write_levels(
+        self, path: Path, levels: "Sequence[Sequence[SimplifyResult]]", name_level: Callable[[str, int], str]
+    ) -> list[Path]:
+        """Write each level to a file of its own."""
+        paths = [path.with_stem(name_level(path.stem, index)) for index in range(len(levels))]
+        for level_path, results in zip(paths, levels, strict=True):
+            self.write_simplified(level_path, results)
+        return paths
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of one mesh at one level."""
+
+    name: str
+    level: int
+    triangles_before: int
+    triangles_after: int
+    error: float
+    reached: bool
+    messages: tuple[str, ...]
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one command.
+
+    Parameters
+    ----------
+    argv
+        The words after the program's name; the process's own by default.
+
+    Returns
+    -------
+    int
+        0 done, 1 an error that was told in one line on standard error, 2 wrong usage.
+    """
+    try:
+        args = _parser().parse_args(argv)
+    except SystemExit as stop:  # Blender would take it for its own
+        return int(stop.code or 0)
+    try:
+        args.run(args)
+    except OSError as error:
+        return _refuse(f"{error.strerror}: {error.filename}" if error.strerror and error.filename else str(error))
+    except ValueError as error:
+        return _refuse(str(error))
+    except MemoryError:
+        return _refuse(f"{args.input.name} is too large for this computer's memory")
+    return 0
+
+
+def _refuse(message: str) -> int:
+    print("eso_lod:", " ".join(message.split()), file=sys.stderr)
+    return 1
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="eso_lod", description="Lighter meshes that keep their shape and features.")
+    words = parser.add_subparsers(required=True, metavar="WORD")
+    simplify = _add_word(words, "simplify", _simplify, "write a mesh with fewer triangles", "IN", "OUT")
+    targets = simplify.add_mutually_exclusive_group(required=True)
+    targets.add_argument("--ratio", type=_ratio, metavar="R", help="share of the triangles to keep, of each mesh")
+    targets.add_argument("--faces", type=_count, metavar="N", help="triangles to keep, of all meshes together")
+    targets.add_argument("--max-error", type=_length, metavar="E", help="largest deviation, in the file's units")
+    _add_engine_words(simplify)
+    lod = _add_word(words, "lod", _lod, "write several levels of detail", "IN", "OUT")
+    targets = lod.add_mutually_exclusive_group(required=True)
+    targets.add_argument("--ratios", type=_list_of(_ratio), metavar="R,R,…", help="share of the triangles at each level")
+    targets.add_argument("--faces", type=_list_of(_count), metavar="N,N,…", help="triangles at each level")
+    targets.add_argument("--errors", type=_list_of(_length), metavar="E,E,…", help="largest deviation at each level")
+    lod.add_argument("--profile", choices=PROFILES, default="plain", help="the engine that names the levels")
+    _add_engine_words(lod)
+    _add_word(words, "measure", _measure, "say how far a mesh is from another", "ORIGINAL", "SIMPLIFIED")
+    return parser
+
+
+def _add_word(
+    words: Any,  # noqa: ANN401 - argparse keeps the type to itself
+    name: str,
+    run: Callable[[argparse.Namespace], None],
+    summary: str,
+    first: str,
+    second: str,
+) -> argparse.ArgumentParser:
+    parser: argparse.ArgumentParser = words.add_parser(name, help=summary, description=f"{summary.capitalize()}.")
+    parser.set_defaults(run=run)
+    parser.add_argument("input", type=_path, metavar=first, help=f"one of {' '.join(FORMATS)}")
+    parser.add_argument("output", type=_path, metavar=second, help="the same")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures to this file too")
+    return parser
+
+
+def _add_engine_words(parser: argparse.ArgumentParser) -> None:
+    """Add the engine's options; one that is not given is left to the engine."""
+    parser.argument_default = argparse.SUPPRESS
+    parser.add_argument("--method", choices=METHODS, help="how vertices are weighted (default: eso)")
+    parser.add_argument("--rings", type=_count, metavar="N", help="rings of neighbours that a weight looks at")
+    parser.add_argument("--preset", choices=("paper",), help="the equations as the paper prints them")
+    parser.add_argument("--placement", choices=("optimal", "endpoint"), help="where a new vertex stands")
+    parser.add_argument("--prune", type=_length, metavar="SIZE", help="drop loose parts smaller than this")
+    parser.add_argument("--no-weld", dest="weld", action="store_false", help="keep vertices at equal positions apart")
+
+
+def _path(word: str) -> Path:
+    path = Path(word)
+    if path.suffix.lower() not in FORMATS:
+        raise argparse.ArgumentTypeError(f"{word} is of no known format; use one of {' '.join(FORMATS)}")
+    return path
+
+
+def _ratio(word: str) -> float:
+    return _number(word, lambda ratio: 0 < ratio <= 1, "a ratio above 0 and at most 1")
+
+
+def _length(word: str) -> float:
+    return _number(word, lambda length: 0 <= length < float("inf"), "a length, 0 or more")
+
+
+def _count(word: str) -> int:
+    return int(_number(word, lambda count: count >= 1 and count == int(count), "a whole number, 1 or more"))
+
+
+def _number(word: str, is_valid: Callable[[float], bool], wanted: str) -> float:
+    try:
+        number = float(word)
+        if is_valid(number):
+            return number
+    except (ValueError, OverflowError):
+        pass
+    raise argparse.ArgumentTypeError(f"{word} is not {wanted}")
+
+
+def _list_of(read: Callable[[str], float]) -> Callable[[str], list[float]]:
+    return lambda words: [read(word) for word in words.split(",")]
+
+
+def _simplify(args: argparse.Namespace) -> None:
+    from .core.simplify import simplify
+
+    keyword, value = _target({"ratio": args.ratio, "faces_target": args.faces, "max_error": args.max_error})
+    options = _engine_options(args)
+
+    def run(part: "Part", goals: list[float]) -> "list[SimplifyResult]":
+        return [simplify(*part[1:], **{keyword: goals[0]}, **options)]
+
+    model = _open(args.input, args.output)
+    started = time.perf_counter()
+    levels = _run_on_parts(model.parts, keyword, [value], run)
+    seconds = time.perf_counter() - started
+    written = model.write_simplified(args.output, levels[0])
+    _report(args, model, levels, [args.output.stem], seconds, written)
+
+
+def _lod(args: argparse.Namespace) -> None:
+    from .core.simplify import lod_chain
+
+    keyword, values = _target({"ratios": args.ratios, "faces_targets": args.faces, "max_errors": args.errors})
+    values = sorted(values, reverse=keyword != "max_errors")  # finest first
+    profile = PROFILES[args.profile]
+    if profile.most_levels and len(values) > profile.most_levels:
+        raise ValueError(f"{profile.label} takes at most {profile.most_levels} levels, not {len(values)}")
+    options = _engine_options(args)
+
+    def run(part: "Part", goals: list[float]) -> "list[SimplifyResult]":
+        return lod_chain(*part[1:], **{keyword: goals}, **options)
+
+    model = _open(args.input, args.output)
+    started = time.perf_counter()
+    levels = _run_on_parts(model.parts, keyword, values, run)
+    seconds = time.perf_counter() - started
+    written = model.write_levels(args.output, levels, profile.name)
+    _report(args, model, levels, [profile.name("", index) for index in range(len(levels))], seconds, written)
+
+
+def _target(values: dict[str, Any]) -> tuple[str, Any]:
+    """Give the one target that was given, under the engine's name for it."""
+    return next((keyword, value) for keyword, value in values.items() if value is not None)
+
+
+def _engine_options(args: argparse.Namespace) -> dict[str, Any]:
+    return {word: getattr(args, word) for word in _ENGINE_WORDS if hasattr(args, word)}
+
+
+def _open(source: Path, target: Path) -> Model:
+    if source.suffix.lower() == target.suffix.lower() == ".off":
+        return OffModel(source)
+    return _scene_files().SceneFile(source)
+
+
+def _scene_files() -> Any:  # noqa: ANN401 - a module
+    try:
+        import bpy  # noqa: F401 - only whether it is there
+    except ImportError as error:
+        raise ValueError(f"only .off files work without Blender's module: pip install bpy ({error})") from None
+    from .bridge import scene_files
+
+    return scene_files
+
+
+def _run_on_parts(
+    parts: "list[Part]",
+    keyword: str,
+    goals: list[float],
+    run: "Callable[[Part, list[float]], list[SimplifyResult]]",
+) -> "list[list[SimplifyResult]]":
+    """Simplify each part; give for each level a result for each part.
+
+    A count is for all parts together: each gets its share of what the smaller ones left over.
+    """
+    results: dict[int, list[SimplifyResult]] = {}
+    left = list(goals)
+    triangles_left = sum(len(faces) for _, _, faces in parts)
+    for index in sorted(range(len(parts)), key=lambda index: len(parts[index][2])):
+        size = len(parts[index][2])
+        is_count = keyword in ("faces_target", "faces_targets")
+        shares = [max(round(goal * size / triangles_left), 1) for goal in left] if is_count else goals
+        try:
+            results[index] = run(parts[index], shares)
+        except ValueError as error:
+            raise ValueError(f"{parts[index][0]}: {error}") from error
+        left = [goal - len(result.faces) for goal, result in zip(left, results[index], strict=True)]
+        triangles_left -= size
+    return [[results[index][level] for index in range(len(parts))] for level in range(len(goals))]
+
+
+def _report(
+    args: argparse.Namespace,
+    model: Model,
+    levels: "list[list[SimplifyResult]]",
+    level_names: list[str],
+    seconds: float,
+    written: list[Path],
+) -> None:
+    outcomes = [
+        Outcome(name, level, len(faces), len(r.faces), float(r.error), bool(r.reached), tuple(r.messages))
+        for level, results in enumerate(levels)
+        for (name, _, faces), r in zip(model.parts, results, strict=True)
+    ]
+    for outcome in outcomes:
+        label = outcome.name if len(levels) == 1 else f"{outcome.name}{level_names[outcome.level]}"
+        counts = f"{outcome.triangles_before} -> {outcome.triangles_after} triangles"
+        print(f"{label}: {counts}, error {outcome.error:.6g}" + "".join(f"; {text}" for text in outcome.messages))
+    for note in model.left_behind:
+        print(note)
+    print(f"{' '.join(map(str, written))} written, {seconds:.2f} s of work")
+    if args.json:
+        _write_json(
+            args.json,
+            {
+                "input": str(args.input),
+                "output": [str(path) for path in written],
+                "seconds": seconds,
+                "meshes": [asdict(outcome) for outcome in outcomes],
+                "not_carried_over": model.left_behind,
+            },
+        )
+
+
+def _measure(args: argparse.Namespace) -> None:
+    from .core.deviation import measure
+
+    deviation = measure(*_triangles(args.input), *_triangles(args.output))
+    rows = {
+        f"{args.input.name} to {args.output.name}": deviation.forward,
+        f"{args.output.name} to {args.input.name}": deviation.backward,
+        "symmetric": deviation.symmetric,
+    }
+    width = max(map(len, rows)) + 2
+    print(" " * width + "".join(f"{title:>14}" for title in ("maximum", "mean", "RMS", "normal (deg)")))
+    for label, row in rows.items():
+        print(label.ljust(width) + "".join(f"{value:14.6g}" for value in (row.maximum, row.mean, row.rms, row.normal)))
+    worst = deviation.symmetric
+    parts = "".join(f"{value / deviation.diagonal:14.6f}" for value in (worst.maximum, worst.mean, worst.rms))
+    print("of the diagonal".ljust(width) + parts)
+    if args.json:
+        _write_json(args.json, _figures(deviation))
+
+
+def _triangles(path: Path) -> "tuple[NDArray[np.float64], NDArray[np.int64]]":
+    if path.suffix.lower() == ".off":
+        return OffModel(path).parts[0][1:]
+    return _scene_files().world_triangles(path)
+
+
+def _figures(deviation: "Deviation") -> dict[str, Any]:
+    return {
+        name: {kind: float(getattr(getattr(deviation, name), kind)) for kind in ("maximum", "mean", "rms", "normal")}
+        for name in ("forward", "backward", "symmetric")
+    } | {"diagonal": float(deviation.diagonal)}
+
+
+def _write_json(path: Path, figures: dict[str, Any]) -> None:
+    from .files.atomic import atomic_output
+
+    with atomic_output(path) as draft:
+        draft.write_text(json.dumps(figures, indent=2) + "\n", encoding="utf-8")
