@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+# Blender reads properties from annotations that are calls:
+# mypy: disable-error-code="valid-type"
+"""The operator that measures how far the active mesh deviates from its original."""
+
+from collections.abc import Generator
+
+import bpy
+import numpy as np
+from bpy.props import BoolProperty, EnumProperty, IntProperty
+
+from ..bridge.read_mesh import MeshArrays, read_mesh
+from ..core.deviation import Deviation, measure
+from ..jobs.modal import EngineOperator
+from ..jobs.worker import Steps
+from .polls import measured_pair, poll_with, why_not_measure
+from .reports import tell
+
+_SPACES = (
+    ("local", "Local", "Compare the shapes, wherever the objects stand"),
+    ("world", "World", "Compare the surfaces where they are in the scene"),
+)
+
+
+class OBJECT_OT_eso_measure(EngineOperator, bpy.types.Operator):
+    """Measure how far the active mesh deviates from the other selected mesh, or from the one it was made from"""
+
+    bl_idname = "object.eso_measure"
+    bl_label = "ESO Measure"
+    bl_options = {"REGISTER", "UNDO", "PRESET"}
+
+    space: EnumProperty(name="Space", items=_SPACES, default="local")
+    apply_modifiers: BoolProperty(
+        name="Apply Modifiers", description="Measure the meshes as modifiers and shape keys show them", default=True
+    )
+    samples: IntProperty(
+        name="Samples", description="Points on each surface whose distance is measured", default=100_000, min=1
+    )
+
+    _title: str
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Need two meshes."""
+        return poll_with(cls, why_not_measure(context))
+
+    def prepare(self, context: bpy.types.Context) -> Steps[Deviation]:
+        """Read both meshes."""
+        original, simplified = measured_pair(context)
+        self._title = f"{simplified.name} against {original.name}"
+        return _measure_steps(self._read(original), self._read(simplified), self.samples)
+
+    def finish(self, context: bpy.types.Context, result: Deviation) -> None:
+        """Report the figures; nothing is written."""
+        both = result.symmetric
+        lines = [
+            f"max {both.maximum:.3g} ({both.maximum / result.diagonal:.2%} of the diagonal)",
+            f"mean {both.mean:.3g}",
+            f"RMS {both.rms:.3g}",
+            f"normals {both.normal:.1f}°",
+            f"original to simplified {result.forward.maximum:.3g}",
+            f"simplified to original {result.backward.maximum:.3g}",
+            f"{self.seconds:.2f} s",
+        ]
+        tell(self, context, self._title, lines)
+
+    def _read(self, obj: bpy.types.Object) -> MeshArrays:
+        world = np.array(obj.matrix_world, np.float64) if self.space == "world" else None
+        return read_mesh(obj, apply_modifiers=self.apply_modifiers, transform=world)
+
+
+OPERATOR = OBJECT_OT_eso_measure
+
+
+def _measure_steps(original: MeshArrays, simplified: MeshArrays, samples: int) -> Generator[float, None, Deviation]:
+    yield 0.0
+    return measure(
+        original.vertices, original.triangles, simplified.vertices, simplified.triangles, samples=samples
+    )

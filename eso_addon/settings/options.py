@@ -1,0 +1,194 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+# Blender reads properties from annotations that are calls:
+# mypy: disable-error-code="valid-type"
+"""The options of the engine as Blender properties, once, for the panel and for the operators; words as in the API."""
+
+from typing import Any
+
+import bpy
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
+
+from ..core.mesh import MeshError
+
+_TARGETS = (
+    ("ratio", "Ratio", "Keep this share of the triangles"),
+    ("count", "Count", "Keep this many triangles"),
+    ("error", "Error", "Keep as few triangles as this deviation allows"),
+)
+_METHODS = (
+    ("eso", "ESO", "Extended second-order weights: features by the surface variation within several rings"),
+    ("so", "SO", "Second-order weights: surface variation within one ring"),
+    ("cf", "Curvature Factor", "Edges weighted by the curvature at both ends"),
+    ("qem", "QEM", "Plain quadric error metric of Garland and Heckbert"),
+)
+_PLACEMENTS = (
+    ("optimal", "Optimal", "New vertices stand where the error is least"),
+    ("endpoint", "Endpoint", "Every vertex left is one of the source's"),
+)
+_PRESETS = (
+    ("default", "Default", "The best that was measured"),
+    ("paper", "Paper", "Equations 8 and 9 as printed, for comparison; sets the options below itself"),
+)
+
+
+class EngineOptions:
+    """How the engine works, whatever the target."""
+
+    preset: EnumProperty(name="Preset", items=_PRESETS, default="default")
+    method: EnumProperty(name="Method", items=_METHODS, default="eso")
+    rings: IntProperty(
+        name="Rings",
+        description="Rings of neighbours that an ESO weight looks at",
+        default=3,
+        min=1,
+        max=16,
+        soft_max=8,
+    )
+    placement: EnumProperty(name="Placement", items=_PLACEMENTS, default="optimal")
+    refit: BoolProperty(
+        name="Refit", description="Move the vertices left so that the new surface fits the old one", default=True
+    )
+    weld: BoolProperty(
+        name="Weld",
+        description="Treat vertices at equal positions as one, so that split seams stay closed",
+        default=True,
+    )
+    prune: FloatProperty(
+        name="Prune Below",
+        description="Drop loose parts smaller than this; 0 keeps every part",
+        default=0.0,
+        min=0.0,
+        subtype="DISTANCE",
+    )
+    apply_modifiers: BoolProperty(
+        name="Apply Modifiers",
+        description="Simplify the mesh as modifiers and shape keys show it; otherwise the results keep the modifiers",
+        default=True,
+    )
+
+    def draw_engine(self, layout: bpy.types.UILayout) -> None:
+        """Draw the options; what the preset decides is greyed."""
+        layout.prop(self, "preset")
+        column = layout.column()
+        column.active = self.preset == "default"
+        column.prop(self, "method")
+        row = column.row()
+        row.active = self.method == "eso"
+        row.prop(self, "rings")
+        column.prop(self, "placement")
+        column.prop(self, "prune")
+        column.prop(self, "refit")
+        layout.prop(self, "weld")
+        layout.prop(self, "apply_modifiers")
+
+    def engine_options(self) -> dict[str, Any]:
+        """Give the options as `simplify` and `lod_chain` take them."""
+        if self.preset == "paper":
+            return {"preset": "paper", "weld": self.weld}
+        return {
+            "method": self.method,
+            "rings": self.rings,
+            "placement": self.placement,
+            "weld": self.weld,
+            "prune": self.prune,
+            "refit": self.refit,
+        }
+
+
+class SimplifyOptions(EngineOptions):
+    """One simplified version."""
+
+    target: EnumProperty(name="Target", items=_TARGETS, default="ratio")
+    ratio: FloatProperty(
+        name="Ratio",
+        description="Share of the triangles to keep",
+        default=0.5,
+        soft_min=0.001,
+        soft_max=1.0,
+        precision=3,
+        subtype="FACTOR",
+    )
+    faces_target: IntProperty(name="Triangles", description="Triangles to keep", default=1000, soft_min=1)
+    max_error: FloatProperty(
+        name="Max Error",
+        description="Largest deviation from the source, in the scene's units",
+        default=0.01,
+        soft_min=0.0,
+        precision=5,
+        subtype="DISTANCE",
+    )
+    in_place: BoolProperty(name="In Place", description="Replace the object's own mesh", default=False)
+    all_users: BoolProperty(
+        name="All Users",
+        description="In place, change every object that shares the mesh; otherwise the object gets a mesh of its own",
+        default=False,
+    )
+
+    def draw_target(self, layout: bpy.types.UILayout) -> None:
+        """Draw the target's kind and its value."""
+        layout.row(align=True).prop(self, "target", expand=True)
+        layout.prop(self, {"ratio": "ratio", "count": "faces_target", "error": "max_error"}[self.target])
+
+    def simplify_target(self) -> dict[str, Any]:
+        """Give the target as `simplify` takes it."""
+        name = {"ratio": "ratio", "count": "faces_target", "error": "max_error"}[self.target]
+        return {name: getattr(self, name)}
+
+    def expected_triangles(self, now: int) -> int | None:
+        """Give the triangles that the target asks for, None if only the engine can tell."""
+        return {"ratio": round(now * self.ratio), "count": min(now, self.faces_target), "error": None}[self.target]
+
+
+class LodOptions(EngineOptions):
+    """A chain of levels."""
+
+    levels_by: EnumProperty(name="Levels By", items=_TARGETS, default="ratio")
+    ratios: StringProperty(
+        name="Ratios",
+        description="Share of the triangles at each level, such as 0.5, 0.25, 0.1",
+        default="0.5, 0.25, 0.1",
+    )
+    faces_targets: StringProperty(
+        name="Triangles", description="Triangles of each level, such as 8000, 2000, 500", default="8000, 2000, 500"
+    )
+    max_errors: StringProperty(
+        name="Errors",
+        description="Largest deviation of each level in the scene's units, such as 0.001, 0.01",
+        default="0.001, 0.01",
+    )
+    collection: StringProperty(
+        name="Collection", description="Where the levels go; empty: a collection named after the object", default=""
+    )
+    replace: BoolProperty(
+        name="Replace Earlier",
+        description="Remove the levels made earlier from this object in the same collection",
+        default=True,
+    )
+
+    def draw_levels(self, layout: bpy.types.UILayout) -> None:
+        """Draw the levels' kind, their list, and where they go."""
+        layout.row(align=True).prop(self, "levels_by", expand=True)
+        layout.prop(self, {"ratio": "ratios", "count": "faces_targets", "error": "max_errors"}[self.levels_by])
+        layout.prop_search(self, "collection", bpy.data, "collections")
+        layout.prop(self, "replace")
+
+    def lod_targets(self) -> dict[str, Any]:
+        """Give the targets as `lod_chain` takes them, finest first."""
+        if self.levels_by == "count":
+            return {"faces_targets": sorted(map(int, _numbers(self.faces_targets, whole=True)), reverse=True)}
+        if self.levels_by == "error":
+            return {"max_errors": sorted(_numbers(self.max_errors))}
+        return {"ratios": sorted(_numbers(self.ratios), reverse=True)}
+
+
+def _numbers(text: str, *, whole: bool = False) -> list[float]:
+    """Read numbers separated by commas."""
+    words = text.replace(";", ",").replace(",", " ").split()
+    example = "8000, 2000, 500" if whole else "0.5, 0.25, 0.1"
+    try:
+        numbers = [float(int(word)) if whole else float(word) for word in words]
+    except ValueError:
+        numbers = []
+    if not numbers:
+        raise MeshError(f"levels '{text}' cannot be read: write numbers with commas between, such as {example}")
+    return numbers

@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+# Blender reads properties from annotations that are calls:
+# mypy: disable-error-code="valid-type"
+"""The panel's settings, saved with the scene, and the figures of the last run, kept for the session."""
+
+import bpy
+from bpy.props import PointerProperty, StringProperty
+
+from .options import LodOptions, SimplifyOptions
+
+
+class ESO_PG_settings(SimplifyOptions, LodOptions, bpy.types.PropertyGroup):
+    """What the panel offers; its names are the operators' own."""
+
+    def hand_over(self, operator: bpy.types.OperatorProperties) -> None:
+        """Set an operator's properties to these settings."""
+        own = self.bl_rna.properties
+        for name, kind in operator.bl_rna.properties.items():
+            if name in own and not kind.is_readonly and name != "name":
+                setattr(operator, name, getattr(self, name))
+
+
+class ESO_PG_last_run(bpy.types.PropertyGroup):
+    """What the last run reported, one line each."""
+
+    title: StringProperty()
+    lines: StringProperty()
+
+    def show(self, title: str, *lines: str) -> None:
+        """Keep a report for the panel."""
+        self.title = title
+        self.lines = "\n".join(lines)
+
+
+_CLASSES = (ESO_PG_settings, ESO_PG_last_run)
+
+
+def register() -> None:
+    """Register the classes and hang them on scenes and on the window manager."""
+    for cls in _CLASSES:
+        bpy.utils.register_class(cls)
+    bpy.types.Scene.eso_lod = PointerProperty(type=ESO_PG_settings)
+    bpy.types.WindowManager.eso_last_run = PointerProperty(type=ESO_PG_last_run)
+
+
+def unregister() -> None:
+    """Take them away again."""
+    del bpy.types.WindowManager.eso_last_run
+    del bpy.types.Scene.eso_lod
+    for cls in reversed(_CLASSES):
+        bpy.utils.unregister_class(cls)

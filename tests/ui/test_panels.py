@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Panels draw into a stand-in for Blender's layout; how they look is seen in a window."""
+
+from types import SimpleNamespace
+
+import bpy
+import pytest
+
+from eso_addon import operators, settings, ui
+from eso_addon.ui import menus, panels
+from tests.bridge.blender_scenes import add_cube, add_sphere
+
+
+class Layout:
+    """Writes down what is drawn."""
+
+    def __init__(self, drawn: list[tuple[str, str, bool]]) -> None:
+        self.drawn = drawn
+        self.enabled = True
+
+    def row(self, **_: object) -> "Layout":
+        return Layout(self.drawn)
+
+    column = split = row
+
+    def label(self, text: str = "") -> None:
+        self.drawn.append(("label", text, True))
+
+    def prop(self, data: bpy.types.bpy_struct, name: str, **_: object) -> None:
+        assert name in data.bl_rna.properties
+        self.drawn.append(("prop", name, True))
+
+    def prop_search(self, data: bpy.types.bpy_struct, name: str, *_: object) -> None:
+        self.prop(data, name)
+
+    def operator(self, name: str, **_: object) -> SimpleNamespace:
+        self.drawn.append(("operator", name, self.enabled))
+        return SimpleNamespace(bl_rna=getattr(bpy.ops.object, name.split(".")[1]).get_rna_type())
+
+    def menu(self, name: str) -> None:
+        self.drawn.append(("menu", name, True))
+
+    def separator(self) -> None:
+        pass
+
+
+def drawn_by(panel: type) -> list[tuple[str, str, bool]]:
+    drawn: list[tuple[str, str, bool]] = []
+    context = SimpleNamespace(
+        **{name: getattr(bpy.context, name) for name in
+           ("scene", "active_object", "selected_objects", "view_layer", "window_manager", "preferences")},
+        region=SimpleNamespace(width=280),
+    )  # fmt: skip
+    panel.draw(SimpleNamespace(layout=Layout(drawn)), context)
+    return drawn
+
+
+def labels(panel: type) -> str:
+    return " ".join(text for kind, text, _ in drawn_by(panel) if kind == "label")
+
+
+def buttons(panel: type) -> dict[str, bool]:
+    return {name: enabled for kind, name, enabled in drawn_by(panel) if kind == "operator"}
+
+
+pytestmark = pytest.mark.usefixtures("addon")
+
+
+@pytest.mark.parametrize("panel", panels._PANELS)
+def test_every_panel_draws_with_and_without_an_object(panel: type) -> None:
+    bpy.context.window_manager.eso_last_run.show("Simplified Ball", "error 0.1")
+    assert drawn_by(panel)
+    add_sphere()
+    assert drawn_by(panel)
+
+
+def test_counts_before_and_after_are_shown_before_the_click() -> None:
+    add_sphere()
+    bpy.context.scene.eso_lod.ratio = 0.25
+    assert "1,280" in labels(panels.VIEW3D_PT_eso_simplify)
+    assert "320" in labels(panels.VIEW3D_PT_eso_simplify)
+    bpy.context.scene.eso_lod.target = "count"
+    assert "1,000" in labels(panels.VIEW3D_PT_eso_simplify)
+    bpy.context.scene.eso_lod.target = "error"
+    assert "as the error allows" in labels(panels.VIEW3D_PT_eso_simplify)
+
+
+def test_what_cannot_run_is_greyed_with_the_reason() -> None:
+    assert buttons(panels.VIEW3D_PT_eso_simplify) == {"object.eso_simplify": False}
+    assert "No active object" in labels(panels.VIEW3D_PT_eso_simplify)
+    assert buttons(panels.VIEW3D_PT_eso_levels) == {"object.eso_lod_generate": False}
+    assert buttons(panels.VIEW3D_PT_eso_measure) == {"object.eso_measure": False}
+    add_cube()
+    assert buttons(panels.VIEW3D_PT_eso_simplify) == {"object.eso_simplify": True}
+    assert buttons(panels.VIEW3D_PT_eso_levels) == {"object.eso_lod_generate": True}
+    assert "Select the original" in labels(panels.VIEW3D_PT_eso_measure)
+
+
+def test_the_last_run_is_shown() -> None:
+    assert not panels.VIEW3D_PT_eso_last_run.poll(bpy.context)
+    add_sphere()
+    bpy.ops.object.eso_simplify(ratio=0.5)
+    assert panels.VIEW3D_PT_eso_last_run.poll(bpy.context)
+    shown = labels(panels.VIEW3D_PT_eso_last_run)
+    assert "1,280 to" in shown
+    assert "error" in shown
+
+
+def test_settings_are_handed_over_by_name() -> None:
+    group = bpy.context.scene.eso_lod
+    for operator in (bpy.ops.object.eso_simplify, bpy.ops.object.eso_lod_generate):
+        own = {name for name, kind in operator.get_rna_type().properties.items() if not kind.is_readonly}
+        assert {"method", "rings"} <= own <= set(group.bl_rna.properties.keys())
+    group.ratio, group.method, group.in_place = 0.125, "qem", True
+    target = SimpleNamespace(bl_rna=bpy.ops.object.eso_simplify.get_rna_type())
+    group.hand_over(target)
+    assert (target.ratio, target.method, target.in_place) == (0.125, "qem", True)
+
+
+def test_the_menu_names_operators_that_exist() -> None:
+    drawn: list[tuple[str, str, bool]] = []
+    menus.VIEW3D_MT_eso_lod.draw(SimpleNamespace(layout=Layout(drawn)), bpy.context)
+    assert [name for _, name, _ in drawn] == list(menus.OPERATORS)
+    menus.draw_entry(SimpleNamespace(layout=Layout(drawn)), bpy.context)
+    assert drawn[-1][:2] == ("menu", "VIEW3D_MT_eso_lod")
+
+
+def test_both_object_menus_have_the_entry_once() -> None:
+    for menu in (bpy.types.VIEW3D_MT_object, bpy.types.VIEW3D_MT_object_context_menu):
+        assert menu._dyn_ui_initialize().count(menus.draw_entry) == 1
+
+
+def test_switching_off_and_on_leaves_nothing_behind() -> None:
+    parts = (settings, operators, ui)
+    for part in reversed(parts):
+        part.unregister()
+    for menu in (bpy.types.VIEW3D_MT_object, bpy.types.VIEW3D_MT_object_context_menu):
+        assert menus.draw_entry not in menu._dyn_ui_initialize()
+    assert not hasattr(bpy.types.Scene, "eso_lod")
+    assert not hasattr(bpy.types.WindowManager, "eso_last_run")
+    assert not hasattr(bpy.types, "OBJECT_OT_eso_simplify")
+    assert not [h for h in bpy.app.handlers.load_pre if h.__module__.startswith("eso_addon")]
+    for part in parts:
+        part.register()
+    assert bpy.ops.object.eso_simplify.idname() == "OBJECT_OT_eso_simplify"
