@@ -47,7 +47,7 @@ class SceneFile:
     def __init__(self, path: Path) -> None:
         with open(path, "rb"):
             pass  # says why a file cannot be opened better than Blender does
-        with _quiet(f"cannot read {path.name}"):
+        with quiet(f"cannot read {path.name}"):
             READERS[path.suffix.lower()](path)
         meshes = [(obj, read_mesh(obj)) for obj in _visible_meshes()]
         self.objects: list[bpy.types.Object] = [obj for obj, mesh in meshes if len(mesh.triangles)]
@@ -170,7 +170,7 @@ def write_scene(path: Path, objects: Sequence[bpy.types.Object]) -> None:
     view_layer = bpy.context.view_layer
     view_layer.update()
     select_only(list(objects), view_layer)
-    with _quiet(f"cannot write {path.name}"), atomic_output(path) as draft:
+    with quiet(f"cannot write {path.name}"), atomic_output(path) as draft:
         WRITERS[path.suffix.lower()](draft)
 
 
@@ -190,7 +190,7 @@ def _joined(objects: Sequence[bpy.types.Object]) -> tuple[NDArray[np.float64], N
 
 
 @contextmanager
-def _quiet(trouble: str) -> Iterator[None]:
+def quiet(trouble: str) -> Iterator[None]:
     """Keep Blender's chatter off the terminal, and turn its errors into one line that begins with the trouble."""
     silent = os.open(os.devnull, os.O_WRONLY)
     _flush()
