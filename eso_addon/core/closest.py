@@ -1,0 +1,341 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Closest points on a triangle mesh for whole arrays of points: a tree of boxes walked by groups of points at once."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .mesh import morton_order
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+_LEAF = 4  # triangles in a leaf
+_FAN = 4  # children of a node
+_BEAM = 4  # nodes followed at each level in search of the first bound
+_GROUP = 8  # points that walk together, where they lie dense enough
+_BLOCK = 512  # groups, or (group, node) pairs, in one step: temporaries stay in the cache and memory is bounded
+_ROUNDING = 1e-12  # slack of the box tests, relative to the size of the mesh
+
+
+class ClosestPoints:
+    """
+    Exact closest points on a triangle mesh.
+
+    Triangles are laid along a Morton curve, four to a leaf and four nodes to a parent. The points are laid along the
+    same curve; groups of neighbours drop to a near leaf for a first bound, then walk down the tree together.
+
+    Parameters
+    ----------
+    vertices
+        (n, 3) float64, finite.
+    faces
+        (m, 3) integers, m > 0. Zero-area triangles count as the segments or points that they are.
+
+    Raises
+    ------
+    ValueError
+        If there are no faces.
+    """
+
+    def __init__(self, vertices: np.ndarray, faces: np.ndarray) -> None:
+        if len(faces) == 0:
+            raise ValueError("The mesh has no faces: there is no surface to find closest points on.")
+        self._faces = len(faces)
+        corners = np.asarray(vertices, dtype=np.float64).take(np.asarray(faces, dtype=np.int64), axis=0)
+        low, high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
+        self._center = (low + high) / 2
+        self._size = float((high - low).max()) or 1.0
+        corners -= self._center
+        corners /= self._size
+        order = morton_order(corners.mean(axis=1))
+        order = np.concatenate([order, np.full(-len(order) % _LEAF, order[-1])])
+        # The j-th triangle of leaf i stands in slot j * leaves + i: a leaf's triangles are gathered row by row.
+        self._face_of_slot = np.ascontiguousarray(order.reshape(-1, _LEAF).T).ravel()
+        self._frames = _frames(corners, self._face_of_slot)
+        self._levels = _box_levels(corners, order)
+
+    def query(
+        self,
+        points: np.ndarray,
+        *,
+        max_distance: float | None = None,
+        hint: np.ndarray | None = None,
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """
+        Return the closest surface point, its face and the squared distance for each point.
+
+        Parameters
+        ----------
+        points
+            (p, 3) float64, finite.
+        max_distance
+            Surface farther away than this is not looked at.
+        hint
+            (p,) a face for each point, thought to be near; -1 where nothing is known.
+
+        Returns
+        -------
+        closest, face, squared
+            (p, 3) float64, (p,) int64 and (p,) float64; NaN, -1 and infinity where nothing lies within `max_distance`.
+        """
+        points = (np.asarray(points, dtype=np.float64) - self._center) / self._size
+        squared = np.full(len(points), np.inf if max_distance is None else (max_distance / self._size) ** 2)
+        slot = np.full(len(points), -1, dtype=np.int64)
+        guess = None if hint is None else self._slots(np.asarray(hint, dtype=np.int64))
+        for rows in _groups(points, self._faces):
+            walk = _Walk(self._levels, self._frames, points.take(rows, axis=0), squared.take(rows))
+            walk.start(None if guess is None else guess.take(rows))
+            walk.run()
+            squared[rows], slot[rows] = walk.squared, walk.slot
+        return self._finish(points, slot)
+
+    def _slots(self, faces: np.ndarray) -> np.ndarray:
+        """Return the slots of faces; -1 stays."""
+        slot = np.empty(self._faces, dtype=np.int64)
+        slot[self._face_of_slot] = np.arange(len(self._face_of_slot))
+        return np.where(faces < 0, -1, slot.take(np.maximum(faces, 0)))
+
+    def _finish(self, points: np.ndarray, slot: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return the answers in the caller's units from the found slots."""
+        closest = np.empty_like(points)
+        for start in range(0, len(points), _BLOCK):
+            part = slice(start, start + _BLOCK)
+            frame = self._frames.take(np.maximum(slot[part], 0), axis=1)
+            closest[part] = _closest_points(frame, points[part].T).T
+        squared = np.einsum("ij,ij->i", points - closest, points - closest) * self._size**2
+        closest *= self._size
+        closest += self._center
+        missed = slot < 0
+        closest[missed], squared[missed] = np.nan, np.inf
+        return closest, np.where(missed, -1, self._face_of_slot.take(np.maximum(slot, 0))), squared
+
+
+class _Walk:
+    """One block of groups of points on its way through the tree: `squared` and `slot` (width, groups) get better."""
+
+    def __init__(self, levels: list[np.ndarray], frames: np.ndarray, points: np.ndarray, squared: np.ndarray) -> None:
+        """Take the tree, (width, groups, 3) points and their (width, groups) bounds."""
+        self.levels, self.frames = levels, frames
+        self.leaf_frames = frames.reshape(len(frames), _LEAF, -1)
+        self.points = np.ascontiguousarray(points.transpose(2, 0, 1))
+        self.squared = squared
+        self.slot = np.full(squared.shape, -1, dtype=np.int64)
+        low, high = self.points.min(axis=1), self.points.max(axis=1)
+        self.center, self.half = (low + high) / 2, (high - low) / 2
+        self.slack = _ROUNDING * (1 + np.abs(self.points).max())
+
+    def start(self, guess: np.ndarray | None) -> None:
+        """Find first bounds: from the guessed slots, or from the leaf that each group's centre falls to."""
+        if guess is not None:
+            known = guess >= 0
+            squared = _squared_distances(self.frames.take(np.maximum(guess, 0), axis=1), self.points)
+            better = known & (squared <= self.squared)
+            self.squared = np.where(better, squared, self.squared)
+            self.slot = np.where(better, guess, -1)
+            if known.all():
+                return
+        self._test_leaves(np.arange(self.squared.shape[1]), self._near_leaves())
+
+    def _near_leaves(self) -> np.ndarray:
+        """Return a leaf near each group's centre, found by following the few most promising nodes of each level."""
+        groups = np.arange(self.squared.shape[1])
+        node = np.zeros((1, len(groups)), dtype=np.int64)
+        for boxes in reversed(self.levels):
+            node = np.minimum(node, boxes.shape[2] - 1)  # empty nodes may be among the followed
+            child = boxes.take(node, axis=2)
+            away = np.abs(child[:3] - self.center[:, None, None])
+            gap = np.maximum(away - child[3:], 0)
+            # Among boxes around the centre the one with the nearer middle is more promising.
+            order = (gap * gap).sum(axis=0) + 1e-3 * (away * away).sum(axis=0)
+            order = order.reshape(-1, len(groups))
+            node = (_FAN * node + np.arange(_FAN)[:, None, None]).reshape(-1, len(groups))
+            if len(order) > _BEAM:
+                best = np.ascontiguousarray(order.T).argpartition(_BEAM, axis=1)[:, :_BEAM].T
+                node, order = node[best, groups], order[best, groups]
+        return np.minimum(node[order.argmin(axis=0), groups], self.leaf_frames.shape[2] - 1)
+
+    def run(self) -> None:
+        """Walk down from the root with every group."""
+        groups = np.arange(self.squared.shape[1])
+        self._descend(len(self.levels) - 1, groups, np.zeros(len(groups), dtype=np.int64))
+
+    def _descend(self, level: int, group: np.ndarray, node: np.ndarray) -> None:
+        """Go on with the children of the (group, node) pairs whose boxes come within the group's bound."""
+        for part in _parts(len(group)):
+            pair_group, pair_node = group[part], node[part]
+            boxes = self.levels[level].take(pair_node, axis=2)
+            bound = (np.sqrt(self.squared.max(axis=0)) + self.slack) ** 2
+            gap = boxes[:3]
+            gap -= self.center.take(pair_group, axis=1)[:, None]
+            np.abs(gap, out=gap)
+            gap -= boxes[3:]
+            gap -= self.half.take(pair_group, axis=1)[:, None]
+            np.maximum(gap, 0, out=gap)
+            gap *= gap
+            near = gap[0] + gap[1] + gap[2] <= bound.take(pair_group)
+            pair, child = np.nonzero(near.T)
+            next_group, next_node = pair_group.take(pair), _FAN * pair_node.take(pair) + child
+            if level:
+                self._descend(level - 1, next_group, next_node)
+            else:
+                self._test_leaves(next_group, next_node)
+
+    def _test_leaves(self, group: np.ndarray, leaf: np.ndarray) -> None:
+        """Test every point of each group against every triangle of its leaf; pairs come sorted by group."""
+        for part in _parts(len(group)):
+            pair_group, pair_leaf = group[part], leaf[part]
+            frames = self.leaf_frames.take(pair_leaf, axis=2)[:, :, None]
+            squared = _squared_distances(frames, self.points.take(pair_group, axis=2)[:, None])
+            best = squared.min(axis=0)
+            starts = np.flatnonzero(np.diff(pair_group, prepend=-1))
+            seen = pair_group.take(starts)
+            least = np.minimum(np.minimum.reduceat(best, starts, axis=1), self.squared.take(seen, axis=1))
+            member, pair = np.nonzero((best == least.repeat(np.diff(starts, append=len(pair_group)), axis=1)))
+            self.squared[:, seen] = least
+            corner = squared[:, member, pair].argmin(axis=0)
+            self.slot[member, pair_group.take(pair)] = corner * self.leaf_frames.shape[2] + pair_leaf.take(pair)
+
+
+def _groups(points: np.ndarray, faces: int) -> Iterator[np.ndarray]:
+    """Yield blocks of (width, groups) point indices: neighbours go together, one by one where they lie far apart."""
+    if len(points) == 0:
+        return
+    order = morton_order(points.clip(-1, 1))  # far points must not make the cells coarse
+    width = _GROUP if 2 * len(points) >= faces else 1
+    order = np.concatenate([order, np.full(-len(order) % width, order[-1])]).reshape(-1, width)
+    blocks = [order]
+    if width > 1:
+        members = points.take(order, axis=0)
+        extent = (members.max(axis=1) - members.min(axis=1)).max(axis=1)
+        wide = extent > 3 * np.median(extent)
+        blocks = [order[~wide], order[wide].reshape(-1, 1)]
+    for block in blocks:
+        for start in range(0, len(block), _BLOCK):
+            yield np.ascontiguousarray(block[start : start + _BLOCK].T)
+
+
+def _parts(count: int) -> Iterator[slice]:
+    """Yield slices of at most a block of pairs."""
+    return (slice(start, start + _BLOCK) for start in range(0, count, _BLOCK))
+
+
+def _box_levels(corners: np.ndarray, order: np.ndarray) -> list[np.ndarray]:
+    """Return (6, _FAN, nodes) centres and half sizes of the children of each node, from the leaves up to the root."""
+    low = corners.min(axis=1).take(order, axis=0).reshape(-1, _LEAF, 3).min(axis=1)
+    high = corners.max(axis=1).take(order, axis=0).reshape(-1, _LEAF, 3).max(axis=1)
+    levels = []
+    while len(low) > 1 or not levels:
+        short = -len(low) % _FAN
+        center = np.concatenate([(low + high) / 2, np.full((short, 3), np.inf)])  # infinitely far away: no child
+        half = np.concatenate([(high - low) / 2, np.zeros((short, 3))])
+        levels.append(np.concatenate([center, half], axis=1).reshape(-1, _FAN, 6).transpose(2, 1, 0).copy())
+        parents = np.arange(0, len(low), _FAN)
+        low, high = np.minimum.reduceat(low, parents), np.maximum.reduceat(high, parents)
+    return levels
+
+
+def _frames(corners: np.ndarray, face_of_slot: np.ndarray) -> np.ndarray:
+    """
+    Return (15, slots) rows that describe each triangle in a frame of its own.
+
+    The origin is the foot of the height on the longest edge, x runs along that edge, y along the height, z along the
+    normal: rows 0 to 11 hold (axis, offset) of x, y, z, rows 12 to 14 the edge's length on the negative and the
+    positive side of the foot and the height. Slivers and zero-area triangles keep orthonormal axes.
+    """
+    frames = np.empty((15, len(face_of_slot)))
+    for start in range(0, len(face_of_slot), _BLOCK):
+        part = slice(start, start + _BLOCK)
+        frames[:, part] = _frame_rows(corners.take(face_of_slot[part], axis=0))
+    return frames
+
+
+def _frame_rows(corners: np.ndarray) -> np.ndarray:
+    """Return the (15, k) rows of `_frames` for (k, 3, 3) corners."""
+    count = np.arange(len(corners))
+    edges = np.roll(corners, -1, axis=1) - corners
+    longest = np.einsum("kij,kij->ki", edges, edges).argmax(axis=1)
+    a, b, c = (corners[count, (longest + turn) % 3] for turn in range(3))
+    along, length = _unit(b - a, np.array([1.0, 0.0, 0.0]))
+    across = c - a
+    across = across - _dot(across, along)[:, None] * along
+    # A height lost in rounding gets any direction across the edge: its length is what keeps it exact.
+    spare = np.cross(along, np.eye(3).take(np.abs(along).argmin(axis=1), axis=0))
+    across, height = _unit(across, spare)
+    across -= _dot(across, along)[:, None] * along
+    across = np.where((_dot(across, across) < 0.5)[:, None], spare, across)
+    across, _ = _unit(across, spare)
+    foot = np.clip(_dot(c - a, along), 0, length)
+    origin = a + foot[:, None] * along
+    axes = [along, across, np.cross(along, across)]
+    rows = [np.column_stack([axis, -_dot(axis, origin)]) for axis in axes]
+    sizes = np.column_stack([foot, length - foot, np.maximum(height, 1e-30)])
+    return np.concatenate([*rows, sizes], axis=1).T
+
+
+def _unit(vectors: np.ndarray, spare: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return unit vectors, `spare` in place of zeros, and the lengths."""
+    length = np.sqrt(_dot(vectors, vectors))
+    zero = length == 0
+    return np.where(zero[:, None], spare, vectors / np.where(zero, 1, length)[:, None]), length
+
+
+def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Return the dot products of rows."""
+    return np.einsum("ij,ij->i", a, b)
+
+
+def _offsets(frame: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, ...]:
+    """
+    Return how far points stick out of their triangles in the triangle's frame.
+
+    The height cuts a triangle into two right triangles, and the closest point of a point lies in the half on its own
+    side: so a point is mirrored onto one half, pushed up to the edge and in over the slope. No branches.
+
+    Returns
+    -------
+    above, below, out, past, side, slope_x, slope_y
+        Height over the plane, depth under the longest edge (at most 0), distance out over the slope (at least 0),
+        distance past the slope's ends, 1 on the positive side and -1 on the other, and the slope's outward normal.
+    """
+    x, y, z = points[0], points[1], points[2]
+    along = frame[0] * x + frame[1] * y + frame[2] * z + frame[3]
+    across = frame[4] * x + frame[5] * y + frame[6] * z + frame[7]
+    above = frame[8] * x + frame[9] * y + frame[10] * z + frame[11]
+    side = np.copysign(1.0, along)
+    length_left, slope_left, flat_left = _slope(frame[12], frame[14])
+    length_right, slope_right, flat_right = _slope(frame[13], frame[14])
+    base = (frame[12] + frame[13]) / 2 + (frame[13] - frame[12]) / 2 * side
+    slope_x = (slope_left + slope_right) / 2 + (slope_right - slope_left) / 2 * side
+    slope_y = (flat_left + flat_right) / 2 + (flat_right - flat_left) / 2 * side
+    length = (length_left + length_right) / 4 + (length_right - length_left) / 4 * side
+    below = np.minimum(across, 0)
+    across = across - below
+    along = along * side - base
+    out = np.maximum(along * slope_x + across * slope_y, 0)
+    past = across * slope_x - along * slope_y - length
+    past = np.copysign(np.maximum(np.abs(past) - length, 0), past)
+    return above, below, out, past, side, slope_x, slope_y
+
+
+def _slope(base: np.ndarray, height: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the hypotenuse of right triangles and its outward unit normal."""
+    length = np.sqrt(base * base + height * height)
+    return length, height / length, base / length
+
+
+def _squared_distances(frame: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Return squared distances of (3, ...) points to triangles given by (15, ...) frames."""
+    above, below, out, past, *_ = _offsets(frame, points)
+    return above * above + below * below + out * out + past * past
+
+
+def _closest_points(frame: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Return the (3, k) points of triangles closest to (3, k) points."""
+    above, below, out, past, side, slope_x, slope_y = _offsets(frame, points)
+    along = (out * slope_x - past * slope_y) * side
+    across = out * slope_y + past * slope_x + below
+    return points - along * frame[0:3] - across * frame[4:7] - above * frame[8:11]
