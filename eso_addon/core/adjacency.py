@@ -50,10 +50,12 @@ def unique_edges(faces: Ints, vertex_count: int) -> tuple[Ints, Ints]:
     """
     keys = _sorted_sides(faces, vertex_count)
     starts = _run_starts(keys)
-    low, high = np.divmod(keys[starts], vertex_count) if vertex_count else (starts, starts)
-    proper = low != high
-    edges = np.stack((low, high), axis=1)
     counts = np.diff(starts, append=len(keys))
+    edges = np.empty((len(starts), 2), dtype=np.int64)
+    keys = np.take(keys, starts)
+    np.floor_divide(keys, max(vertex_count, 1), out=edges[:, 0])
+    np.subtract(keys, edges[:, 0] * vertex_count, out=edges[:, 1])
+    proper = edges[:, 0] != edges[:, 1]
     return (edges, counts) if proper.all() else (edges[proper], counts[proper])
 
 
@@ -145,12 +147,25 @@ def one_rings(faces: Ints, vertex_count: int) -> tuple[Ints, Ints]:
     neighbours : (2 e,) int64; those of vertex v are `neighbours[offsets[v]:offsets[v + 1]]`, ascending
     """
     edges, _ = unique_edges(faces, vertex_count)
-    low, high = edges[:, 0], edges[:, 1]
-    keys = np.concatenate((low * vertex_count + high, high * vertex_count + low))
-    keys.sort()
-    counts = np.bincount(edges.ravel(), minlength=vertex_count)
-    offsets = _offsets(counts)
-    return offsets, keys - np.repeat(np.arange(vertex_count) * vertex_count, counts)
+    return rings_of_edges(edges, vertex_count)
+
+
+def rings_of_edges(edges: Ints, vertex_count: int) -> tuple[Ints, Ints]:
+    """Return what `one_rings` does from the edges that `unique_edges` gives, in their order."""
+    low, high = np.ascontiguousarray(edges.T)
+    lower_keys = high * vertex_count
+    lower_keys += low
+    lower_keys.sort()
+    lower_counts = np.bincount(high, minlength=vertex_count)
+    higher_counts = np.bincount(low, minlength=vertex_count)
+    offsets = _offsets(lower_counts + higher_counts)
+    neighbours = np.empty(2 * len(edges), dtype=np.int64)
+    # a vertex's lower neighbours come first; both kinds are sorted already, so that each knows its place
+    place = np.arange(len(edges))
+    lower_keys -= np.repeat(np.arange(vertex_count) * vertex_count, lower_counts)
+    neighbours[place + np.repeat(np.cumsum(higher_counts) - higher_counts, lower_counts)] = lower_keys
+    neighbours[place + np.repeat(np.cumsum(lower_counts), higher_counts)] = high
+    return offsets, neighbours
 
 
 def stars(faces: Ints, vertex_count: int) -> tuple[Ints, Ints]:
