@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What each choice of the engine gives: the same meshes with one option changed at a time."""
+
+from __future__ import annotations
+
+import json
+import statistics
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from .peers import FIGURES
+from .report import machine, table
+from .runner import MeshRun, Plan, deviation, load
+from .summary import geometric_mean
+
+BASE = "default"
+VARIANTS: dict[str, dict[str, Any]] = {
+    BASE: {},
+    "refit off": {"refit": False},
+    "`qem`, refit off": {"method": "qem", "refit": False},
+    "`qem`, refit on": {"method": "qem"},
+    "`so` (one ring)": {"method": "so"},
+    **{f"{rings} ring{'s' * (rings > 1)}": {"rings": rings} for rings in (1, 2, 3, 4)},
+    **{f"{rings} ring{'s' * (rings > 1)}, refit off": {"rings": rings, "refit": False} for rings in (1, 2, 3, 4)},
+    **{f"power {power:g}, refit off": {"weight_power": power, "refit": False} for power in (0.25, 0.5, 0.75, 1.0)},
+    "preset `paper`": {"preset": "paper"},
+    "endpoints": {"placement": "endpoint", "refit": False},
+}
+KINDS = ("maximum", "mean", "normal", "seconds")
+
+
+def run_ablation(plan: Plan, say: Callable[[str], None]) -> list[dict[str, Any]]:
+    """Run every variant over the meshes and ratios of the plan (its peers are not used); return plain rows."""
+    rows: list[dict[str, Any]] = []
+    refused: set[str] = set()
+    for name, make in plan.meshes.items():
+        mesh = make()
+        with tempfile.TemporaryDirectory() as folder:
+            cases = MeshRun(name, mesh, Path(folder), plan, say)
+            with cases.stack:
+                worker = cases.worker(FIGURES["ablation"])
+                for ratio in plan.ratios:
+                    target = max(4, round(cases.triangles * ratio))
+                    seconds: dict[str, list[float]] = {}
+                    figures: dict[str, dict[str, float]] = {}
+                    for turn in range(plan.repeat):
+                        for variant, options in VARIANTS.items():
+                            answer = {"error": ""} if variant in refused else worker.ask(target, options)
+                            if "error" in answer:
+                                if variant not in refused:
+                                    say(f"{variant}: {answer['error']}")
+                                refused.add(variant)
+                                continue
+                            seconds.setdefault(variant, []).append(answer["seconds"])
+                            if turn == 0:
+                                figures[variant] = deviation(mesh, load(answer))
+                    case = {"mesh": name, "ratio": ratio, "triangles": cases.triangles}
+                    rows += [
+                        {**case, "variant": variant, **figures[variant], "seconds": statistics.median(runs)}
+                        for variant, runs in seconds.items()
+                    ]
+                    say(f"{name} at {ratio:.0%}: {len(seconds)} variants")
+    return rows
+
+
+def means(rows: list[dict[str, Any]]) -> dict[str, dict[str, float | None]]:
+    """Return each variant's geometric means over the default's, case by case."""
+    base = {(row["mesh"], row["ratio"]): row for row in rows if row["variant"] == BASE}
+    found: dict[str, dict[str, float | None]] = {}
+    for variant in VARIANTS:
+        mine = [row for row in rows if row["variant"] == variant and (row["mesh"], row["ratio"]) in base]
+        pairs = [(row, base[row["mesh"], row["ratio"]]) for row in mine]
+        if pairs:
+            found[variant] = {
+                kind: geometric_mean(max(a[kind], 1e-9) / max(b[kind], 1e-9) for a, b in pairs) for kind in KINDS
+            }
+    return found
+
+
+def write_ablation(folder: Path, rows: list[dict[str, Any]]) -> None:
+    """Write ablation.md and ablation.json into the folder."""
+    folder.mkdir(parents=True, exist_ok=True)
+    about, found = machine(), means(rows)
+    (folder / "ablation.json").write_text(json.dumps({"about": about, "means": found, "rows": rows}, indent=1) + "\n")
+    cases = len({(row["mesh"], row["ratio"]) for row in rows})
+    text = [
+        "# Ablation",
+        f"{about['date']}; {about['machine']}. Geometric means over the default's figures, {cases} cases; "
+        "smaller is better, 1 is the default.",
+        table(["variant", "maximum", "mean", "normals", "time"], [(name, *v.values()) for name, v in found.items()]),
+    ]
+    (folder / "ablation.md").write_text("\n\n".join(text) + "\n")
