@@ -17,7 +17,8 @@ _LEAF = 4  # triangles in a leaf
 _FAN = 4  # children of a node
 _BEAM = 4  # nodes followed at each level in search of the first bound
 _GROUP = 8  # points that walk together, where they lie dense enough
-_BLOCK = 512  # groups, or (group, node) pairs, in one step: temporaries stay in the cache and memory is bounded
+_BLOCK_POINTS = 4096  # points that walk at once
+_BLOCK_PAIRS = 4096  # pairs looked at in one step: temporaries stay in the cache, and memory is bounded
 _ROUNDING = 1e-12  # slack of the box tests, relative to the size of the mesh
 
 
@@ -41,7 +42,7 @@ class ClosestPoints:
         If there are no faces.
     """
 
-    def __init__(self, vertices: np.ndarray, faces: np.ndarray) -> None:
+    def __init__(self, vertices: Floats, faces: Ints) -> None:
         if len(faces) == 0:
             raise ValueError("The mesh has no faces: there is no surface to find closest points on.")
         self._faces = len(faces)
@@ -51,7 +52,7 @@ class ClosestPoints:
         self._size = float((high - low).max()) or 1.0
         corners -= self._center
         corners /= self._size
-        order = morton_order(corners.mean(axis=1))
+        order = _tree_order(corners.mean(axis=1))
         order = np.concatenate([order, np.full(-len(order) % _LEAF, order[-1])])
         # The j-th triangle of leaf i stands in slot j * leaves + i: a leaf's triangles are gathered row by row.
         self._face_of_slot = np.ascontiguousarray(order.reshape(-1, _LEAF).T).ravel()
@@ -60,11 +61,11 @@ class ClosestPoints:
 
     def query(
         self,
-        points: np.ndarray,
+        points: Floats,
         *,
         max_distance: float | None = None,
-        hint: np.ndarray | None = None,
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        hint: Ints | None = None,
+    ) -> tuple[Floats, Ints, Floats]:
         """
         Return the closest surface point, its face and the squared distance for each point.
 
@@ -93,17 +94,16 @@ class ClosestPoints:
             squared[rows], slot[rows] = walk.squared, walk.slot
         return self._finish(points, slot)
 
-    def _slots(self, faces: np.ndarray) -> np.ndarray:
+    def _slots(self, faces: Ints) -> Ints:
         """Return the slots of faces; -1 stays."""
         slot = np.empty(self._faces, dtype=np.int64)
         slot[self._face_of_slot] = np.arange(len(self._face_of_slot))
         return np.where(faces < 0, -1, slot.take(np.maximum(faces, 0)))
 
-    def _finish(self, points: np.ndarray, slot: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _finish(self, points: Floats, slot: Ints) -> tuple[Floats, Ints, Floats]:
         """Return the answers in the caller's units from the found slots."""
         closest = np.empty_like(points)
-        for start in range(0, len(points), _BLOCK):
-            part = slice(start, start + _BLOCK)
+        for part in _parts(len(points), _BLOCK_POINTS):
             frame = self._frames.take(np.maximum(slot[part], 0), axis=1)
             closest[part] = _closest_points(frame, points[part].T).T
         squared = np.einsum("ij,ij->i", points - closest, points - closest) * self._size**2
@@ -117,7 +117,7 @@ class ClosestPoints:
 class _Walk:
     """One block of groups of points on its way through the tree: `squared` and `slot` (width, groups) get better."""
 
-    def __init__(self, levels: list[np.ndarray], frames: np.ndarray, points: np.ndarray, squared: np.ndarray) -> None:
+    def __init__(self, levels: list[Floats], frames: Floats, points: Floats, squared: Floats) -> None:
         """Take the tree, (width, groups, 3) points and their (width, groups) bounds."""
         self.levels, self.frames = levels, frames
         self.leaf_frames = frames.reshape(len(frames), _LEAF, -1)
@@ -128,8 +128,8 @@ class _Walk:
         self.center, self.half = (low + high) / 2, (high - low) / 2
         self.slack = _ROUNDING * (1 + np.abs(self.points).max())
 
-    def start(self, guess: np.ndarray | None) -> None:
-        """Find first bounds: from the guessed slots, or from the leaf that each group's centre falls to."""
+    def start(self, guess: Ints | None) -> None:
+        """Find first bounds: from the guessed slots, or from a leaf near each group's centre."""
         if guess is not None:
             known = guess >= 0
             squared = _squared_distances(self.frames.take(np.maximum(guess, 0), axis=1), self.points)
@@ -138,9 +138,10 @@ class _Walk:
             self.slot = np.where(better, guess, -1)
             if known.all():
                 return
-        self._test_leaves(np.arange(self.squared.shape[1]), self._near_leaves())
+        leaf = np.broadcast_to(self._near_leaves(), self.squared.shape).ravel()
+        self._test_leaves(np.arange(len(leaf)), leaf)
 
-    def _near_leaves(self) -> np.ndarray:
+    def _near_leaves(self) -> Ints:
         """Return a leaf near each group's centre, found by following the few most promising nodes of each level."""
         groups = np.arange(self.squared.shape[1])
         node = np.zeros((1, len(groups)), dtype=np.int64)
@@ -149,7 +150,7 @@ class _Walk:
             child = boxes.take(node, axis=2)
             away = np.abs(child[:3] - self.center[:, None, None])
             gap = np.maximum(away - child[3:], 0)
-            # Among boxes around the centre the one with the nearer middle is more promising.
+            # among boxes around the centre the one with the nearer middle is more promising
             order = (gap * gap).sum(axis=0) + 1e-3 * (away * away).sum(axis=0)
             order = order.reshape(-1, len(groups))
             node = (_FAN * node + np.arange(_FAN)[:, None, None]).reshape(-1, len(groups))
@@ -163,44 +164,57 @@ class _Walk:
         groups = np.arange(self.squared.shape[1])
         self._descend(len(self.levels) - 1, groups, np.zeros(len(groups), dtype=np.int64))
 
-    def _descend(self, level: int, group: np.ndarray, node: np.ndarray) -> None:
+    def _descend(self, level: int, group: Ints, node: Ints) -> None:
         """Go on with the children of the (group, node) pairs whose boxes come within the group's bound."""
-        for part in _parts(len(group)):
+        for part in _parts(len(group), _BLOCK_PAIRS):
             pair_group, pair_node = group[part], node[part]
             boxes = self.levels[level].take(pair_node, axis=2)
             bound = (np.sqrt(self.squared.max(axis=0)) + self.slack) ** 2
-            gap = boxes[:3]
-            gap -= self.center.take(pair_group, axis=1)[:, None]
-            np.abs(gap, out=gap)
-            gap -= boxes[3:]
-            gap -= self.half.take(pair_group, axis=1)[:, None]
-            np.maximum(gap, 0, out=gap)
-            gap *= gap
-            near = gap[0] + gap[1] + gap[2] <= bound.take(pair_group)
-            pair, child = np.nonzero(near.T)
-            next_group, next_node = pair_group.take(pair), _FAN * pair_node.take(pair) + child
+            half = boxes[3:] + self.half.take(pair_group, axis=1)[:, None]
+            near = _squared_gaps(boxes[:3], half, self.center.take(pair_group, axis=1)[:, None])
+            pair, child = np.nonzero((near <= bound.take(pair_group)).T)
+            next_group = pair_group.take(pair)
             if level:
-                self._descend(level - 1, next_group, next_node)
+                self._descend(level - 1, next_group, _FAN * pair_node.take(pair) + child)
             else:
-                self._test_leaves(next_group, next_node)
+                self._meet_leaves(next_group, _FAN * pair_node.take(pair) + child, boxes[:, child, pair])
 
-    def _test_leaves(self, group: np.ndarray, leaf: np.ndarray) -> None:
-        """Test every point of each group against every triangle of its leaf; pairs come sorted by group."""
-        for part in _parts(len(group)):
-            pair_group, pair_leaf = group[part], leaf[part]
-            frames = self.leaf_frames.take(pair_leaf, axis=2)[:, :, None]
-            squared = _squared_distances(frames, self.points.take(pair_group, axis=2)[:, None])
-            best = squared.min(axis=0)
-            starts = np.flatnonzero(np.diff(pair_group, prepend=-1))
-            seen = pair_group.take(starts)
-            least = np.minimum(np.minimum.reduceat(best, starts, axis=1), self.squared.take(seen, axis=1))
-            member, pair = np.nonzero((best == least.repeat(np.diff(starts, append=len(pair_group)), axis=1)))
-            self.squared[:, seen] = least
-            corner = squared[:, member, pair].argmin(axis=0)
-            self.slot[member, pair_group.take(pair)] = corner * self.leaf_frames.shape[2] + pair_leaf.take(pair)
+    def _meet_leaves(self, group: Ints, leaf: Ints, boxes: Floats) -> None:
+        """Test the points of each group whose own bound reaches the leaf's box."""
+        for part in _parts(len(group), _BLOCK_PAIRS):
+            pair_group = group[part]
+            near = _squared_gaps(boxes[:3, None, part], boxes[3:, None, part], self.points.take(pair_group, axis=2))
+            bound = (np.sqrt(self.squared.take(pair_group, axis=1)) + self.slack) ** 2
+            pair, member = np.nonzero((near <= bound).T)
+            self._test_leaves(member * self.squared.shape[1] + pair_group.take(pair), leaf[part].take(pair))
+
+    def _test_leaves(self, point: Ints, leaf: Ints) -> None:
+        """Test points against the triangles of leaves and keep what is nearer."""
+        points, best, slot = self.points.reshape(3, -1), self.squared.reshape(-1), self.slot.reshape(-1)
+        for part in _parts(len(point), _BLOCK_PAIRS):
+            pair_point, pair_leaf = point[part], leaf[part]
+            frames = self.leaf_frames.take(pair_leaf, axis=2)
+            squared = _squared_distances(frames, points.take(pair_point, axis=1)[:, None])
+            least = squared.min(axis=0)
+            np.minimum.at(best, pair_point, least)
+            won = np.flatnonzero(least <= best.take(pair_point))
+            corner = squared[:, won].argmin(axis=0)
+            slot[pair_point.take(won)] = corner * self.leaf_frames.shape[2] + pair_leaf.take(won)
 
 
-def _groups(points: np.ndarray, faces: int) -> Iterator[np.ndarray]:
+def _squared_gaps(center: Floats, half: Floats, points: Floats) -> Floats:
+    """Return the squared distances of (3, ...) points to boxes."""
+    gap = np.abs(center - points)
+    gap -= half
+    np.maximum(gap, 0, out=gap)
+    gap *= gap
+    total = gap[0]
+    total += gap[1]
+    total += gap[2]
+    return total
+
+
+def _groups(points: Floats, faces: int) -> Iterator[Ints]:
     """Yield blocks of (width, groups) point indices: neighbours go together, one by one where they lie far apart."""
     if len(points) == 0:
         return
@@ -214,16 +228,42 @@ def _groups(points: np.ndarray, faces: int) -> Iterator[np.ndarray]:
         wide = extent > 3 * np.median(extent)
         blocks = [order[~wide], order[wide].reshape(-1, 1)]
     for block in blocks:
-        for start in range(0, len(block), _BLOCK):
-            yield np.ascontiguousarray(block[start : start + _BLOCK].T)
+        for part in _parts(len(block), _BLOCK_POINTS // block.shape[1]):
+            yield np.ascontiguousarray(block[part].T)
 
 
-def _parts(count: int) -> Iterator[slice]:
-    """Yield slices of at most a block of pairs."""
-    return (slice(start, start + _BLOCK) for start in range(0, count, _BLOCK))
+def _parts(count: int, size: int) -> Iterator[slice]:
+    """Yield slices of at most `size`."""
+    return (slice(start, start + size) for start in range(0, count, size))
 
 
-def _box_levels(corners: np.ndarray, order: np.ndarray) -> list[np.ndarray]:
+def _tree_order(points: Floats) -> Ints:
+    """Return the order of (n, 3) points in a tree that halves each node's points across its longest axis."""
+    count = len(points)
+    index_bits = max(count - 1, 1).bit_length()
+    half = _LEAF
+    while 2 * half < count:
+        half *= 2
+    columns = np.ascontiguousarray(points.T)
+    order = np.arange(count)
+    while half >= _LEAF:
+        starts = np.arange(0, count, 2 * half)
+        low, high = np.minimum.reduceat(columns, starts, axis=1), np.maximum.reduceat(columns, starts, axis=1)
+        axis = (high - low).argmax(axis=0)
+        node = np.arange(count) // (2 * half)
+        bits = 63 - index_bits - len(starts).bit_length()
+        key = ((columns.take(axis.take(node) * count + np.arange(count)) + 1) * 2.0 ** (bits - 1)).astype(np.int64)
+        key += node << bits
+        key <<= index_bits
+        key |= np.arange(count)
+        key.sort()
+        key &= (1 << index_bits) - 1
+        order, columns = order.take(key), columns.take(key, axis=1)
+        half //= 2
+    return order
+
+
+def _box_levels(corners: Floats, order: Ints) -> list[Floats]:
     """Return (6, _FAN, nodes) centres and half sizes of the children of each node, from the leaves up to the root."""
     low = corners.min(axis=1).take(order, axis=0).reshape(-1, _LEAF, 3).min(axis=1)
     high = corners.max(axis=1).take(order, axis=0).reshape(-1, _LEAF, 3).max(axis=1)
@@ -238,7 +278,7 @@ def _box_levels(corners: np.ndarray, order: np.ndarray) -> list[np.ndarray]:
     return levels
 
 
-def _frames(corners: np.ndarray, face_of_slot: np.ndarray) -> np.ndarray:
+def _frames(corners: Floats, face_of_slot: Ints) -> Floats:
     """
     Return (15, slots) rows that describe each triangle in a frame of its own.
 
@@ -247,13 +287,12 @@ def _frames(corners: np.ndarray, face_of_slot: np.ndarray) -> np.ndarray:
     positive side of the foot and the height. Slivers and zero-area triangles keep orthonormal axes.
     """
     frames = np.empty((15, len(face_of_slot)))
-    for start in range(0, len(face_of_slot), _BLOCK):
-        part = slice(start, start + _BLOCK)
+    for part in _parts(len(face_of_slot), _BLOCK_POINTS):
         frames[:, part] = _frame_rows(corners.take(face_of_slot[part], axis=0))
     return frames
 
 
-def _frame_rows(corners: np.ndarray) -> np.ndarray:
+def _frame_rows(corners: Floats) -> Floats:
     """Return the (15, k) rows of `_frames` for (k, 3, 3) corners."""
     count = np.arange(len(corners))
     edges = np.roll(corners, -1, axis=1) - corners
@@ -276,19 +315,19 @@ def _frame_rows(corners: np.ndarray) -> np.ndarray:
     return np.concatenate([*rows, sizes], axis=1).T
 
 
-def _unit(vectors: np.ndarray, spare: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _unit(vectors: Floats, spare: Floats) -> tuple[Floats, Floats]:
     """Return unit vectors, `spare` in place of zeros, and the lengths."""
     length = np.sqrt(_dot(vectors, vectors))
     zero = length == 0
     return np.where(zero[:, None], spare, vectors / np.where(zero, 1, length)[:, None]), length
 
 
-def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+def _dot(a: Floats, b: Floats) -> Floats:
     """Return the dot products of rows."""
     return np.einsum("ij,ij->i", a, b)
 
 
-def _offsets(frame: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, ...]:
+def _offsets(frame: Floats, points: Floats) -> tuple[Floats, ...]:
     """
     Return how far points stick out of their triangles in the triangle's frame.
 
@@ -321,19 +360,19 @@ def _offsets(frame: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, ...]:
     return above, below, out, past, side, slope_x, slope_y
 
 
-def _slope(base: np.ndarray, height: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _slope(base: Floats, height: Floats) -> tuple[Floats, Ints, Floats]:
     """Return the hypotenuse of right triangles and its outward unit normal."""
     length = np.sqrt(base * base + height * height)
     return length, height / length, base / length
 
 
-def _squared_distances(frame: np.ndarray, points: np.ndarray) -> np.ndarray:
+def _squared_distances(frame: Floats, points: Floats) -> Floats:
     """Return squared distances of (3, ...) points to triangles given by (15, ...) frames."""
     above, below, out, past, *_ = _offsets(frame, points)
     return above * above + below * below + out * out + past * past
 
 
-def _closest_points(frame: np.ndarray, points: np.ndarray) -> np.ndarray:
+def _closest_points(frame: Floats, points: Floats) -> Floats:
     """Return the (3, k) points of triangles closest to (3, k) points."""
     above, below, out, past, side, slope_x, slope_y = _offsets(frame, points)
     along = (out * slope_x - past * slope_y) * side
