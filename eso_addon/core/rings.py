@@ -19,8 +19,7 @@ Bits = NDArray[np.uint64]
 
 # Vertices a block: enough to make a call of numpy worth its while, few enough for the processor's second cache.
 BLOCK = 1024
-# A vertex of more neighbours than this ends every way that comes to it: the rim of a fan of n faces would
-# otherwise hold n * n pairs.
+# No way leads through a vertex of more neighbours than this: the rim of a fan of n faces would hold n * n pairs.
 HUB = 1024
 # Above this many neighbours a row is united on its own.
 LONG_ROW = 64
@@ -38,12 +37,11 @@ class Pairs(NamedTuple):
 
 
 class _Graph(NamedTuple):
-    """The one-rings (CSR) with their lengths, and a number for each vertex of the block at hand (-1 elsewhere)."""
+    """The one-rings (CSR) with their lengths, and a number for each vertex at hand (-1 elsewhere)."""
 
     offsets: Ints
     neighbours: Ints
-    degrees: Ints
-    through: Ints  # degrees, but zero at hubs
+    counts: Ints  # how many neighbours ways lead to: none from a hub
     row: Ints
     column: Ints
 
@@ -62,13 +60,18 @@ def near_pairs(offsets: Ints, neighbours: Ints, rings: int) -> Iterator[Pairs]:
     No way of more than one step leads through a vertex of more than `HUB` neighbours.
     """
     count = len(offsets) - 1
-    degrees = np.diff(offsets)
-    through = np.where(degrees > HUB, 0, degrees)
-    graph = _Graph(offsets, neighbours, degrees, through, np.full(count, -1), np.full(count, -1))
+    counts = np.diff(offsets)
+    hubs = np.flatnonzero(counts > HUB)
+    around_hubs = [neighbours[offsets[hub] : offsets[hub + 1]] for hub in hubs]
+    if len(hubs):
+        neighbours = neighbours.compress(np.repeat(counts <= HUB, counts))
+        counts[hubs] = 0
+        offsets = np.concatenate(([0], np.cumsum(counts)))
+    graph = _Graph(offsets, neighbours, counts, np.full(count, -1), np.full(count, -1))
     later = _later_bits(BLOCK)
     for start in range(0, count, BLOCK):
         block = np.arange(start, min(start + BLOCK, count))
-        levels = _levels(graph, block, rings)
+        levels = _levels(graph, block, neighbours[offsets[start] : offsets[block[-1] + 1]], rings)
         inner = np.concatenate(levels[:-1])
         near = np.concatenate(levels)
         # pairs with a lower vertex belong to that one's block
@@ -77,15 +80,28 @@ def near_pairs(offsets: Ints, neighbours: Ints, rings: int) -> Iterator[Pairs]:
         for first in range(0, len(columns), width):
             part = columns[first : first + width]
             graph.column[part] = np.arange(len(part))
+            graph.column[hubs] = -1
             sets = _grown(graph, levels, inner, len(part))
             graph.column[part] = -1
             if first == 0:  # the block itself: each pair once
                 sets[:, : later.shape[1]] &= later[: len(block), : sets.shape[1]]
-                yield Pairs(columns, *_members(sets))
-            else:
-                one, other = _members(sets)
-                yield Pairs(columns, one, other + first)
+            one, other = _members(sets)
+            other += first
+            yield Pairs(columns, one, other)
         graph.row[near] = -1
+    yield from _hub_pairs(graph, hubs, around_hubs, rings)
+
+
+def _hub_pairs(graph: _Graph, hubs: Ints, around: list[Ints], rings: int) -> Iterator[Pairs]:
+    """Find the pairs that have a hub in them, hub by hub: there are few, and each has many."""
+    is_hub = np.zeros(len(graph.row), dtype=bool)
+    is_hub[hubs] = True
+    for hub, ring in zip(hubs, around):
+        near = np.concatenate(_levels(graph, np.array([hub]), ring, rings))
+        graph.row[near] = -1
+        vertices = near.compress(~is_hub[near] | (near >= hub))  # the hub itself is the first of them
+        other = np.arange(1, len(vertices))
+        yield Pairs(vertices, np.zeros_like(other), other)
 
 
 def _later_bits(size: int) -> Bits:
@@ -93,18 +109,17 @@ def _later_bits(size: int) -> Bits:
     return np.packbits(np.tri(size, k=0, dtype=np.uint8) ^ 1, axis=1, bitorder="little").view(WORD)
 
 
-def _levels(graph: _Graph, block: Ints, rings: int) -> list[Ints]:
-    """Return the block, its first ring, its second ring, ..., and leave all of them marked in `graph.row`."""
+def _levels(graph: _Graph, block: Ints, near: Ints, rings: int) -> list[Ints]:
+    """Return the block, its first ring (among `near`), its second, ..., and leave all marked in `graph.row`."""
     levels = [block]
     graph.row[block] = 0
-    near = graph.neighbours[graph.offsets[block[0]] : graph.offsets[block[-1] + 1]]
     for ring in range(rings):
         front = np.sort(near.compress(np.take(graph.row, near) < 0))
         front = front.compress(np.diff(front, prepend=-1) > 0)
         graph.row[front] = 0
         levels.append(front)
         if ring < rings - 1:
-            near = _rows(graph, front, np.take(graph.through, front))
+            near = _rows(graph, front, np.take(graph.counts, front))
     return levels
 
 
@@ -120,16 +135,15 @@ def _grown(graph: _Graph, levels: list[Ints], inner: Ints, width: int) -> Bits:
     """Return what lies within the rings of each vertex of the block, as rows of bits over `graph.column`."""
     rings = len(levels) - 1
     graph.row[inner] = np.arange(len(inner))
-    sets = _one_ring_sets(graph, inner, graph.degrees if rings == 1 else graph.through, width)
+    sets = _one_ring_sets(graph, inner, width)
     for ring in range(2, rings + 1):
-        vertices = np.concatenate(levels[: rings + 1 - ring])
-        sets = _united(graph, vertices, graph.degrees if ring == rings else graph.through, sets)
+        sets = _united(graph, np.concatenate(levels[: rings + 1 - ring]), sets)
     return np.take(sets, np.take(graph.row, levels[0]), axis=0)
 
 
-def _one_ring_sets(graph: _Graph, vertices: Ints, degrees: Ints, width: int) -> Bits:
+def _one_ring_sets(graph: _Graph, vertices: Ints, width: int) -> Bits:
     """Return for each vertex the set of itself and its neighbours."""
-    counts = np.take(degrees, vertices)
+    counts = np.take(graph.counts, vertices)
     words = (width + 63) // 64
     firsts = np.arange(0, len(vertices) * words, words)
     columns = np.take(graph.column, np.concatenate((vertices, _rows(graph, vertices, counts))))
@@ -144,10 +158,10 @@ def _one_ring_sets(graph: _Graph, vertices: Ints, degrees: Ints, width: int) -> 
     return sets
 
 
-def _united(graph: _Graph, vertices: Ints, degrees: Ints, sets: Bits) -> Bits:
+def _united(graph: _Graph, vertices: Ints, sets: Bits) -> Bits:
     """Unite the set of each vertex with its neighbours' sets, and number the rows anew."""
     # those of most neighbours first: the i-th neighbours then belong to the first so many rows
-    order = np.sort((-np.take(degrees, vertices) << 40) + vertices)
+    order = np.sort((-np.take(graph.counts, vertices) << 40) + vertices)
     counts = -(order >> 40)
     vertices = order & ((1 << 40) - 1)
     starts = np.take(graph.offsets, vertices)

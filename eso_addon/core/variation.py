@@ -78,8 +78,8 @@ def angle_defects_and_areas(vertices: Floats, faces: Ints) -> tuple[Floats, Floa
         angles[:, i] = np.arctan2(doubled, np.einsum("ij,ij->i", u, v))
     count = len(vertices)
     sums = np.bincount(faces.ravel(), weights=angles.ravel(), minlength=count)
-    areas = np.bincount(faces.ravel(), weights=np.repeat(0.5 * doubled, 3), minlength=count)
-    defects: Floats = 2.0 * np.pi - sums
+    areas = np.bincount(faces.ravel(), weights=np.repeat(0.5 * doubled, 3), minlength=count).astype(np.float64, copy=False)
+    defects = 2.0 * np.pi - sums
     return defects, areas
 
 

@@ -5,10 +5,13 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from .oracle import endpoint, error_at, initial_quadrics, moved, optimal, oracle_simplify, plane_quadrics
+from eso_addon.core.adjacency import Ints
+from eso_addon.core.normals import Floats
+
+from .oracle import Place, endpoint, error_at, initial_quadrics, moved, optimal, oracle_simplify, plane_quadrics
 
 
-def plane_grid(side, tilt=(0.3, -0.2)):
+def plane_grid(side: int, tilt: tuple[float, float] = (0.3, -0.2)) -> tuple[Floats, Ints]:
     x, y = np.meshgrid(np.arange(side, dtype=float), np.arange(side, dtype=float))
     vertices = np.stack((x, y, tilt[0] * x + tilt[1] * y), axis=-1).reshape(-1, 3)
     ids = np.arange(side * side).reshape(side, side)
@@ -16,12 +19,12 @@ def plane_grid(side, tilt=(0.3, -0.2)):
     return vertices, np.concatenate((np.stack((a, b, c), 1), np.stack((a, c, d), 1)))
 
 
-def area(vertices, faces):
+def area(vertices: Floats, faces: Ints) -> float:
     a, b, c = (vertices[faces[:, i]] for i in range(3))
-    return np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2
+    return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()) / 2
 
 
-def test_quadrics_measure_squared_distance_to_the_plane():
+def test_quadrics_measure_squared_distance_to_the_plane() -> None:
     rng = np.random.default_rng(0)
     point, x, origin = rng.normal(size=(3, 3))
     normal = rng.normal(size=3)
@@ -31,7 +34,7 @@ def test_quadrics_measure_squared_distance_to_the_plane():
     assert_allclose(error_at(tuple(moved(quadric, origin)[0]), tuple(x - origin)), ((x - point) @ normal) ** 2)
 
 
-def test_optimal_finds_where_three_planes_meet():
+def test_optimal_finds_where_three_planes_meet() -> None:
     rng = np.random.default_rng(1)
     normals = np.linalg.qr(rng.normal(size=(3, 3)))[0]
     corner = rng.normal(size=3)
@@ -42,7 +45,7 @@ def test_optimal_finds_where_three_planes_meet():
 
 
 @pytest.mark.parametrize("place", [optimal, endpoint])
-def test_flat_patch_keeps_its_outline(place):
+def test_flat_patch_keeps_its_outline(place: Place) -> None:
     vertices, faces = plane_grid(8)
     result = oracle_simplify(vertices, faces, initial_quadrics(vertices, faces, boundary=1.0), 2, place=place)
     assert len(result.faces) == 2
@@ -50,7 +53,7 @@ def test_flat_patch_keeps_its_outline(place):
     assert max(result.costs) < 1e-12
 
 
-def test_closed_surface_stops_at_a_tetrahedron():
+def test_closed_surface_stops_at_a_tetrahedron() -> None:
     vertices = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], dtype=float)
     faces = np.array([[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]])
     result = oracle_simplify(vertices, faces, initial_quadrics(vertices, faces), 0)
@@ -58,7 +61,7 @@ def test_closed_surface_stops_at_a_tetrahedron():
     assert len(result.vertices) == 4
 
 
-def test_weights_scale_the_costs_of_their_vertices():
+def test_weights_scale_the_costs_of_their_vertices() -> None:
     vertices, faces = plane_grid(4)
     weights = np.linspace(0.5, 2.0, len(vertices))
     plain, weighted = initial_quadrics(vertices, faces), initial_quadrics(vertices, faces, weights=weights, power=2.0)
