@@ -17,7 +17,7 @@ _CLAY, _LINES, _PAPER, _INK = (0.80, 0.52, 0.32), (0.05, 0.03, 0.02), (0.93, 0.9
 _CELL = (1.28, 1.02)  # width and height of a cell in lengths of the mesh
 
 
-def contact_sheet(path: Path, meshes: Sequence[tuple[str, bpy.types.Mesh]], width: int = 1800) -> None:
+def contact_sheet(path: Path, meshes: Sequence[tuple[str, bpy.types.Mesh]], width: int = 1500) -> None:
     """Render meshes in a grid, each with its label below.
 
     Parameters
@@ -102,7 +102,7 @@ def _add_camera(scene: bpy.types.Scene, extent: tuple[float, float]) -> None:
 
 
 def _add_lights(scene: bpy.types.Scene) -> None:
-    for name, strength, angle, turn in (("Key", 3.2, 12, (52, 8, -38)), ("Rim", 1.1, 30, (70, 0, 130))):
+    for name, strength, angle, turn in (("Key", 2.9, 8, (52, 8, -38)), ("Rim", 1.1, 30, (70, 0, 130))):
         light = bpy.data.lights.new(name, "SUN")
         light.energy, light.angle = strength, radians(angle)
         obj = bpy.data.objects.new(name, light)
@@ -117,8 +117,10 @@ def _set_up_render(scene: bpy.types.Scene, width: int, height: int) -> None:
     render.film_transparent = False
     render.image_settings.file_format = "PNG"
     scene.cycles.device = "CPU"
-    scene.cycles.samples = 48
-    scene.cycles.use_denoising = False
+    scene.cycles.samples = 16
+    scene.cycles.adaptive_threshold = 0.03
+    scene.cycles.max_bounces = 1
+    scene.cycles.use_denoising = False  # it would soften the lines
     scene.view_settings.view_transform = "Standard"
     scene.world = _world()
 
@@ -132,7 +134,7 @@ def _world() -> bpy.types.World:
     seen, light = nodes.new("ShaderNodeBackground"), nodes.new("ShaderNodeBackground")
     seen.inputs["Color"].default_value = (*_PAPER, 1)
     light.inputs["Color"].default_value = (0.75, 0.83, 1.0, 1)
-    light.inputs["Strength"].default_value = 0.55
+    light.inputs["Strength"].default_value = 0.5
     ray, mix, output = nodes.new("ShaderNodeLightPath"), nodes.new("ShaderNodeMixShader"), nodes.new("ShaderNodeOutputWorld")
     links.new(ray.outputs["Is Camera Ray"], mix.inputs[0])
     links.new(light.outputs[0], mix.inputs[1])

@@ -2,10 +2,11 @@
 """Files of meshes through Blender's importers and exporters, for the command line: Y forward, Z up, quiet, atomic."""
 
 import ctypes
+import io
 import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from pathlib import Path
 
 import bpy
@@ -198,7 +199,9 @@ def quiet(trouble: str) -> Iterator[None]:
     try:
         for fd in kept:
             os.dup2(silent, fd)
-        yield
+        # Python's own streams may stand for something else than the process's.
+        with redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()):
+            yield
     except RuntimeError as error:
         raise FileFormatError(f"{trouble}: {_last_word(str(error))}") from error
     finally:

@@ -1,0 +1,22 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What all tests share."""
+
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+
+
+@pytest.fixture(scope="session")
+def root() -> Path:
+    """Give the project's folder."""
+    return Path(__file__).parent.parent
+
+
+@pytest.fixture(scope="session")
+def sample_meshes() -> Path:
+    """Give the folder of meshes in pymeshlab's wheel, which is not imported: it does not go well with bpy."""
+    spec = find_spec("pymeshlab")
+    if spec is None or not spec.submodule_search_locations:
+        pytest.skip("pymeshlab is not installed")
+    return Path(spec.submodule_search_locations[0]) / "tests" / "sample_meshes"
