@@ -22,8 +22,9 @@ PLAIN = {"markersize": 5, "linewidth": 1.2}
 
 def _style(peer: str) -> dict[str, object]:
     """Return how a peer is drawn: ours solid with dots, the others dashed with crosses, a colour each."""
-    colour = f"C{list(PEERS).index(peer) % 10}"
-    return {"color": colour, "marker": "o" if PEERS[peer].ours else "x", "linestyle": "-" if PEERS[peer].ours else "--"}
+    colours, own = plt.get_cmap("tab20").colors, PEERS[peer].ours
+    colour = colours[list(PEERS).index(peer) % len(colours)]
+    return {"color": colour, "marker": "o" if own else "x", "linestyle": "-" if own else "--"}
 
 
 def _peers(rows: Rows) -> list[str]:
@@ -31,11 +32,19 @@ def _peers(rows: Rows) -> list[str]:
     return [name for name in PEERS if name in present]
 
 
+def _shared(rows: Rows) -> Rows:
+    """Keep the cases that every peer has: a mean over other meshes would not compare."""
+    peers = _peers(rows)
+    cases = [{(row["mesh"], row["ratio"]) for row in rows if row["peer"] == peer} for peer in peers]
+    common = set.intersection(*cases) if cases else set()
+    return [row for row in rows if (row["mesh"], row["ratio"]) in common and row["mesh"] not in SPECIAL]
+
+
 def _deviation(axes: Axes, rows: Rows, figure: str, label: str) -> None:
     for peer in _peers(rows):
         by_ratio = defaultdict(list)
         for row in rows:
-            if row["peer"] == peer and row["mesh"] not in SPECIAL:
+            if row["peer"] == peer:
                 by_ratio[row["ratio"]].append(row[figure])
         points = sorted((ratio * 100, geometric_mean(values) or 0) for ratio, values in by_ratio.items())
         if points:
@@ -73,8 +82,9 @@ def draw(folder: Path, rows: Rows) -> None:
         From `runner.run`.
     """
     figure, pair = plt.subplots(1, 2, figsize=(12, 5), layout="constrained")
-    _deviation(pair[0], rows, "mean", "mean deviation (of the diagonal)")
-    _deviation(pair[1], rows, "maximum", "maximum deviation (of the diagonal)")
+    shared = _shared(rows)
+    _deviation(pair[0], shared, "mean", "mean deviation (of the diagonal)")
+    _deviation(pair[1], shared, "maximum", "maximum deviation (of the diagonal)")
     figure.suptitle("Deviation, geometric mean over the meshes")
     _save(folder, "deviation", pair[1])
     figure, axes = plt.subplots(figsize=(8, 5), layout="constrained")

@@ -40,7 +40,7 @@ class Worker:
 
     def __exit__(self, *_: object) -> None:
         self.process.kill()
-        self.process.wait()
+        self.process.communicate()
 
     def ask(self, target: int, options: dict[str, Any] | None = None) -> dict[str, Any]:
         """Simplify to `target` triangles; return seconds, peak, faces and out (the .npz file), or error."""
