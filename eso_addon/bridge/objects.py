@@ -55,6 +55,8 @@ def add_object(
     bpy.types.Object
     """
     obj = source.copy()
+    if obj.override_library is not None:  # else a reload would give the library's mesh back
+        obj = obj.make_local(clear_liboverride=True)
     obj.name = name
     obj.data = mesh
     if modifiers_applied:
@@ -151,6 +153,13 @@ def leave_edit_mode(obj: bpy.types.Object) -> None:
     """Switch from Edit Mode to Object Mode: what is done to objects in Edit Mode cannot be undone."""
     if obj.mode == "EDIT":
         bpy.ops.object.mode_set(mode="OBJECT")
+
+
+def join_local_view(objects: Iterable[bpy.types.Object], space: bpy.types.Space | None) -> None:
+    """Show objects in a viewport that is in Local View; they would be missing there otherwise."""
+    if isinstance(space, bpy.types.SpaceView3D) and space.local_view is not None:
+        for obj in objects:
+            obj.local_view_set(space, True)
 
 
 def select_only(objects: list[bpy.types.Object], view_layer: bpy.types.ViewLayer) -> None:

@@ -7,7 +7,7 @@ from typing import Any
 import bpy
 
 from ..core.mesh import MeshError
-from .worker import Steps, Worker, run_to_end
+from .worker import GRACE_SECONDS, Steps, Worker, run_to_end
 
 _POLL_SECONDS = 0.05
 # What the user may go on doing while the engine works; anything else could change the source under it.
@@ -21,6 +21,7 @@ class EngineOperator:
     _worker: Worker[Any]
     _timer: Any
     _start: float
+    _stop_time: float
 
     def prepare(self, context: bpy.types.Context) -> Steps[Any]:
         """Read Blender's data and return the engine's generator, which touches arrays only."""
@@ -57,17 +58,17 @@ class EngineOperator:
         """Show progress, stop on Esc, write the result when the thread has ended."""
         if event.type == "ESC" and event.value == "PRESS":
             self._worker.stop()
-        if self._worker.is_running:
+            self._stop_time = time.perf_counter()
+        if self._worker.is_running and not self._is_given_up():
             if event.type == "TIMER":
                 self._show_progress(context)
             return {"PASS_THROUGH"} if event.type in _VIEW_EVENTS else {"RUNNING_MODAL"}
         self._clean_up(context)
+        if self._worker.is_stopped:
+            self.report({"INFO"}, "Cancelled: nothing was changed")  # type: ignore[attr-defined]
+            return {"CANCELLED"}
         try:
-            result = self._worker.result()
-            if self._worker.is_stopped:
-                self.report({"INFO"}, "Cancelled: nothing was changed")  # type: ignore[attr-defined]
-                return {"CANCELLED"}
-            return self._finished(context, result)
+            return self._finished(context, self._worker.result())
         except (MeshError, MemoryError) as error:
             return self._refused(error)
         except ReferenceError:
@@ -76,8 +77,11 @@ class EngineOperator:
     def cancel(self, context: bpy.types.Context) -> None:
         """Join the thread when Blender takes the operator away: a file is loaded, the window closed."""
         self._worker.stop()
-        self._worker.join()
+        self._worker.join(GRACE_SECONDS)
         self._clean_up(context)
+
+    def _is_given_up(self) -> bool:
+        return self._worker.is_stopped and time.perf_counter() - self._stop_time > GRACE_SECONDS
 
     def _finished(self, context: bpy.types.Context, result: Any) -> set[str]:  # noqa: ANN401
         self.seconds = time.perf_counter() - self._start

@@ -9,6 +9,9 @@ from weakref import WeakSet
 Result = TypeVar("Result")
 Steps = Generator[float, None, Result]
 
+# A step that lasts longer is left to end by itself: it touches arrays only, and nobody takes its result.
+GRACE_SECONDS = 3.0
+
 _running: "WeakSet[Worker]" = WeakSet()
 
 
@@ -79,4 +82,4 @@ def stop_all() -> None:
     for worker in workers:
         worker.stop()
     for worker in workers:
-        worker.join()
+        worker.join(GRACE_SECONDS)

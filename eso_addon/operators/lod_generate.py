@@ -11,7 +11,7 @@ from ..jobs.modal import EngineOperator
 from ..jobs.worker import Steps
 from ..settings.options import LodOptions
 from .polls import poll_with, why_not_simplify
-from .reports import notes_of, tell, triangles
+from .reports import notes_of, tell
 
 
 class OBJECT_OT_eso_lod_generate(EngineOperator, LodOptions, bpy.types.Operator):
@@ -62,9 +62,13 @@ class OBJECT_OT_eso_lod_generate(EngineOperator, LodOptions, bpy.types.Operator)
             for number, level in enumerate(result)
         ]
         objects.select_only(levels, context.view_layer)
-        counts = [f"{triangles(before, len(level.faces))}, error {level.error:.3g}" for level in result]
-        lines = [f"LOD{number} {count}" for number, count in enumerate(counts)]
-        tell(self, context, f"Levels of {obj.name}", [*lines, f"{self.seconds:.2f} s"], notes)
+        objects.join_local_view(levels, context.space_data)
+        counts = [len(level.faces) for level in result]
+        lines = [
+            f"LOD{number} {count:,} ({count / max(before, 1):.1%}), error {level.error:.3g}"
+            for number, (count, level) in enumerate(zip(counts, result, strict=True))
+        ]
+        tell(self, context, f"Levels of {obj.name}", [f"{before:,} triangles", *lines, f"{self.seconds:.2f} s"], notes)
 
 
 OPERATOR = OBJECT_OT_eso_lod_generate

@@ -10,7 +10,7 @@ def why_not_simplify(context: bpy.types.Context) -> str:
     """Say why the active object cannot be simplified; empty if it can."""
     obj = context.active_object
     if obj is None:
-        return "No active object: select a mesh object"
+        return "No active object: select a mesh"
     if obj.type != "MESH":
         return f"'{obj.name}' is no mesh: convert it first (Object > Convert > Mesh)"
     if obj.mode not in {"OBJECT", "EDIT"}:
@@ -35,18 +35,18 @@ def why_not_measure(context: bpy.types.Context) -> str:
     obj = context.active_object
     if obj is None or obj.type != "MESH":
         return why_not_simplify(context)
-    others = _other_selected(context)
+    others = _others_to_measure(context)
     if len(others) > 1:
-        return "Select only one mesh object besides the active one"
+        return "Select only one mesh besides the active one"
     if not others and objects.source_of(obj) is None:
-        return "Select the original too, then the simplified mesh: it is measured against the other"
+        return "Select the original, then the simplified mesh too"
     return ""
 
 
 def measured_pair(context: bpy.types.Context) -> tuple[bpy.types.Object, bpy.types.Object]:
     """Give the original, which is the other selected mesh or the active one's source, and the active mesh."""
     obj = context.active_object
-    others = _other_selected(context)
+    others = _others_to_measure(context)
     return (others[0] if others else objects.source_of(obj)), obj
 
 
@@ -57,6 +57,9 @@ def poll_with(operator: type[bpy.types.Operator], reason: str) -> bool:
     return not reason
 
 
-def _other_selected(context: bpy.types.Context) -> list[bpy.types.Object]:
+def _others_to_measure(context: bpy.types.Context) -> list[bpy.types.Object]:
+    """List the other selected meshes, but for levels of the same source: these are selected after they were made."""
     obj = context.active_object
-    return [other for other in context.selected_objects if other.type == "MESH" and other != obj]
+    others = [other for other in context.selected_objects if other.type == "MESH" and other != obj]
+    source = objects.source_of(obj)
+    return [other for other in others if source is None or objects.source_of(other) != source]

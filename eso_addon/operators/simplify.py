@@ -66,6 +66,7 @@ class OBJECT_OT_eso_simplify(EngineOperator, SimplifyOptions, bpy.types.Operator
                 properties=objects.result_properties(obj, before, after, result.error),
             )
             objects.select_only([new], context.view_layer)
+            objects.join_local_view([new], context.space_data)
         lines = [triangles(before, after), f"error {result.error:.3g}", f"{self.seconds:.2f} s"]
         tell(self, context, f"Simplified {obj.name}", lines, notes_of(self._source.left_behind, result))
 

@@ -24,7 +24,7 @@ class VIEW3D_PT_eso_simplify(_SidebarPanel, bpy.types.Panel):
         layout, settings = self.layout, context.scene.eso_lod
         layout.use_property_split, layout.use_property_decorate = True, False
         reason = why_not_simplify(context)
-        if not reason:
+        if not reason and context.mode == "OBJECT":  # Edit Mode knows its count only when it is left
             _draw_counts(layout, context)
         settings.draw_target(layout)
         layout.prop(settings, "in_place")

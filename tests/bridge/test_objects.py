@@ -76,6 +76,25 @@ def test_linked_data_is_not_replaced(tmp_path: Path, local_object: bool) -> None
         objects.replace_mesh(obj, mesh, modifiers_applied=True)
 
 
+def test_the_result_of_a_library_override_is_local(tmp_path: Path) -> None:
+    collection = objects.level_collection("Far", bpy.context.scene)
+    collection.objects.link(add_cube())
+    path = str(tmp_path / "library.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    with bpy.data.libraries.load(path, link=True) as (_, ours):
+        ours.collections = ["Far"]
+    scene = bpy.context.scene
+    bpy.data.collections["Far"].override_hierarchy_create(scene, bpy.context.view_layer, do_fully_editable=True)
+    source = next(obj for obj in bpy.data.objects if obj.override_library is not None)
+    mesh = new_mesh()
+    new = objects.add_object(source, mesh, "New", [scene.collection], modifiers_applied=True, properties={})
+    assert new.override_library is None
+    assert new.data == mesh
+    with pytest.raises(MeshError, match="make it local first"):
+        objects.replace_mesh(source, mesh, modifiers_applied=True)
+
+
 def test_the_source_is_found_by_name_until_it_is_gone() -> None:
     obj, level = add_cube(), add_sphere()
     assert objects.source_of(level) is None

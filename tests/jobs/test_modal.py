@@ -91,6 +91,15 @@ def test_esc_writes_nothing(context: MagicMock) -> None:
     assert_cleaned_up(context)
 
 
+def test_a_step_that_lasts_is_left_to_itself_after_esc(context: MagicMock, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(modal, "GRACE_SECONDS", -1.0)
+    operator = started(Operator(), context)
+    assert operator.modal(context, ESC) == {"CANCELLED"}
+    assert operator.written == []
+    assert_cleaned_up(context)
+    operator.gate.set()
+
+
 def test_meanwhile_the_view_moves_and_nothing_else_happens(context: MagicMock) -> None:
     operator = started(Operator(), context)
     assert operator.modal(context, KEY) == {"RUNNING_MODAL"}

@@ -88,6 +88,14 @@ def test_edit_mode_is_left() -> None:
     assert bpy.context.object.name == "Ball_LOD0"
 
 
+def test_the_report_has_every_level() -> None:
+    add_sphere()
+    generate(ratios="0.5, 0.25")
+    lines = bpy.context.window_manager.eso_last_run.lines.split("\n")
+    assert lines[0] == "1,280 triangles"
+    assert [line.split(" (")[0] for line in lines[1:3]] == ["LOD0 640", "LOD1 320"]
+
+
 def test_no_active_object() -> None:
     with pytest.raises(RuntimeError, match="No active object"):
         generate()

@@ -57,15 +57,22 @@ def test_the_size_of_the_objects_matters() -> None:
     assert float(last_lines()[0].split()[1]) == pytest.approx(1, abs=0.05)
 
 
+def test_a_level_is_measured_against_its_source_though_its_siblings_are_selected() -> None:
+    add_sphere()
+    bpy.ops.object.eso_lod_generate(ratios="0.5, 0.25")
+    measure_active()
+    assert bpy.context.window_manager.eso_last_run.title == "Ball_LOD0 against Ball"
+
+
 def test_one_mesh_alone_is_refused() -> None:
     add_sphere()
-    with pytest.raises(RuntimeError, match="Select the original too"):
+    with pytest.raises(RuntimeError, match="Select the original, then"):
         measure_active()
 
 
 def test_three_meshes_are_refused() -> None:
     activate(add_sphere(), add_cube(), add_cube("Third"))
-    with pytest.raises(RuntimeError, match="only one mesh object"):
+    with pytest.raises(RuntimeError, match="only one mesh besides"):
         measure_active()
 
 
@@ -73,7 +80,7 @@ def test_a_source_that_is_gone_is_refused() -> None:
     obj = add_sphere()
     bpy.ops.object.eso_simplify(ratio=0.25)
     bpy.data.objects.remove(obj)
-    with pytest.raises(RuntimeError, match="Select the original too"):
+    with pytest.raises(RuntimeError, match="Select the original, then"):
         measure_active()
 
 

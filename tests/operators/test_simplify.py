@@ -184,7 +184,7 @@ def test_linked_data_is_refused_in_place(tmp_path: Path) -> None:
 
 
 def test_no_active_object() -> None:
-    with pytest.raises(RuntimeError, match="No active object: select a mesh object"):
+    with pytest.raises(RuntimeError, match="No active object: select a mesh"):
         simplify_active()
 
 

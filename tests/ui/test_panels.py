@@ -48,7 +48,7 @@ def drawn_by(panel: type) -> list[tuple[str, str, bool]]:
     drawn: list[tuple[str, str, bool]] = []
     context = SimpleNamespace(
         **{name: getattr(bpy.context, name) for name in
-           ("scene", "active_object", "selected_objects", "view_layer", "window_manager", "preferences")},
+           ("scene", "mode", "active_object", "selected_objects", "view_layer", "window_manager", "preferences")},
         region=SimpleNamespace(width=280),
     )  # fmt: skip
     panel.draw(SimpleNamespace(layout=Layout(drawn)), context)
