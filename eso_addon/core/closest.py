@@ -19,6 +19,7 @@ _BEAM = 4  # nodes followed at each level in search of the first bound
 _GROUP = 8  # points that walk together, where they lie dense enough
 _BLOCK_POINTS = 4096  # points that walk at once
 _BLOCK_PAIRS = 4096  # pairs looked at in one step: temporaries stay in the cache, and memory is bounded
+_NO_HEIGHT = 1e-30  # the height of a zero-area triangle: no special case, and no error that counts
 _ROUNDING = 1e-12  # slack of the box tests, relative to the size of the mesh
 
 
@@ -46,18 +47,18 @@ class ClosestPoints:
         if len(faces) == 0:
             raise ValueError("The mesh has no faces: there is no surface to find closest points on.")
         self._faces = len(faces)
-        corners = np.asarray(vertices, dtype=np.float64).take(np.asarray(faces, dtype=np.int64), axis=0)
-        low, high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
-        self._center = (low + high) / 2
-        self._size = float((high - low).max()) or 1.0
-        corners -= self._center
-        corners /= self._size
-        order = _tree_order(corners.mean(axis=1))
+        faces = np.asarray(faces, dtype=np.int64)
+        corners = np.asarray(vertices, dtype=np.float64).take(faces, axis=0)
+        low, high = corners.min(axis=1), corners.max(axis=1)
+        self._center = (low.min(axis=0) + high.max(axis=0)) / 2
+        self._size = float((high.max(axis=0) - low.min(axis=0)).max()) or 1.0
+        low, high, middle = ((x - self._center) / self._size for x in (low, high, corners.mean(axis=1)))
+        order = _tree_order(middle)
         order = np.concatenate([order, np.full(-len(order) % _LEAF, order[-1])])
-        # The j-th triangle of leaf i stands in slot j * leaves + i: a leaf's triangles are gathered row by row.
+        # the j-th triangle of leaf i stands in slot j * leaves + i: a leaf's triangles are gathered row by row
         self._face_of_slot = np.ascontiguousarray(order.reshape(-1, _LEAF).T).ravel()
-        self._frames = _frames(corners, self._face_of_slot)
-        self._levels = _box_levels(corners, order)
+        self._frames = triangle_frames((vertices - self._center) / self._size, faces.take(self._face_of_slot, axis=0))
+        self._levels = _box_levels(low.take(order, axis=0), high.take(order, axis=0))
 
     def query(
         self,
@@ -105,7 +106,7 @@ class ClosestPoints:
         closest = np.empty_like(points)
         for part in _parts(len(points), _BLOCK_POINTS):
             frame = self._frames.take(np.maximum(slot[part], 0), axis=1)
-            closest[part] = _closest_points(frame, points[part].T).T
+            closest[part] = closest_in_triangles(frame, points[part].T).T
         squared = np.einsum("ij,ij->i", points - closest, points - closest) * self._size**2
         closest *= self._size
         closest += self._center
@@ -132,7 +133,7 @@ class _Walk:
         """Find first bounds: from the guessed slots, or from a leaf near each group's centre."""
         if guess is not None:
             known = guess >= 0
-            squared = _squared_distances(self.frames.take(np.maximum(guess, 0), axis=1), self.points)
+            squared = squared_distances(self.frames.take(np.maximum(guess, 0), axis=1), self.points)
             better = known & (squared <= self.squared)
             self.squared = np.where(better, squared, self.squared)
             self.slot = np.where(better, guess, -1)
@@ -194,7 +195,7 @@ class _Walk:
         for part in _parts(len(point), _BLOCK_PAIRS):
             pair_point, pair_leaf = point[part], leaf[part]
             frames = self.leaf_frames.take(pair_leaf, axis=2)
-            squared = _squared_distances(frames, points.take(pair_point, axis=1)[:, None])
+            squared = squared_distances(frames, points.take(pair_point, axis=1)[:, None])
             least = squared.min(axis=0)
             np.minimum.at(best, pair_point, least)
             won = np.flatnonzero(least <= best.take(pair_point))
@@ -263,10 +264,9 @@ def _tree_order(points: Floats) -> Ints:
     return order
 
 
-def _box_levels(corners: Floats, order: Ints) -> list[Floats]:
+def _box_levels(low: Floats, high: Floats) -> list[Floats]:
     """Return (6, _FAN, nodes) centres and half sizes of the children of each node, from the leaves up to the root."""
-    low = corners.min(axis=1).take(order, axis=0).reshape(-1, _LEAF, 3).min(axis=1)
-    high = corners.max(axis=1).take(order, axis=0).reshape(-1, _LEAF, 3).max(axis=1)
+    low, high = low.reshape(-1, _LEAF, 3).min(axis=1), high.reshape(-1, _LEAF, 3).max(axis=1)
     levels = []
     while len(low) > 1 or not levels:
         short = -len(low) % _FAN
@@ -278,53 +278,61 @@ def _box_levels(corners: Floats, order: Ints) -> list[Floats]:
     return levels
 
 
-def _frames(corners: Floats, face_of_slot: Ints) -> Floats:
-    """
-    Return (15, slots) rows that describe each triangle in a frame of its own.
+def triangle_frames(vertices: Floats, faces: Ints) -> Floats:
+    """Return (15, m) rows that describe each triangle in a frame of its own.
 
     The origin is the foot of the height on the longest edge, x runs along that edge, y along the height, z along the
     normal: rows 0 to 11 hold (axis, offset) of x, y, z, rows 12 to 14 the edge's length on the negative and the
     positive side of the foot and the height. Slivers and zero-area triangles keep orthonormal axes.
+
+    Parameters
+    ----------
+    vertices : (n, 3) float64
+    faces : (m, 3) int64
     """
-    frames = np.empty((15, len(face_of_slot)))
-    for part in _parts(len(face_of_slot), _BLOCK_POINTS):
-        frames[:, part] = _frame_rows(corners.take(face_of_slot[part], axis=0))
+    frames = np.empty((15, len(faces)))
+    columns = np.ascontiguousarray(vertices.T)
+    for part in _parts(len(faces), _BLOCK_POINTS):
+        _write_frames(columns.take(faces[part].T, axis=1), frames[:, part])
     return frames
 
 
-def _frame_rows(corners: Floats) -> Floats:
-    """Return the (15, k) rows of `_frames` for (k, 3, 3) corners."""
-    count = np.arange(len(corners))
-    edges = np.roll(corners, -1, axis=1) - corners
-    longest = np.einsum("kij,kij->ki", edges, edges).argmax(axis=1)
-    a, b, c = (corners[count, (longest + turn) % 3] for turn in range(3))
-    along, length = _unit(b - a, np.array([1.0, 0.0, 0.0]))
+def _write_frames(corners: Floats, frames: Floats) -> None:
+    """Write the rows of `triangle_frames` for (3 axes, 3 corners, k) corners."""
+    edges = corners[:, [1, 2, 0]] - corners
+    first = (edges * edges).sum(axis=0).argmax(axis=0)
+    a, b, c = (corners[:, (first + turn) % 3, np.arange(len(first))] for turn in range(3))
+    along, length = _unit(b - a, np.array([[1.0], [0.0], [0.0]]))
     across = c - a
-    across = across - _dot(across, along)[:, None] * along
-    # A height lost in rounding gets any direction across the edge: its length is what keeps it exact.
-    spare = np.cross(along, np.eye(3).take(np.abs(along).argmin(axis=1), axis=0))
+    foot = _dot(across, along).clip(0, length)
+    across -= foot * along
+    # a height lost in rounding may point anywhere across the edge: its length is what keeps it exact
+    spare = _cross(along, np.eye(3).take(np.abs(along).argmin(axis=0), axis=1))
     across, height = _unit(across, spare)
-    across -= _dot(across, along)[:, None] * along
-    across = np.where((_dot(across, across) < 0.5)[:, None], spare, across)
-    across, _ = _unit(across, spare)
-    foot = np.clip(_dot(c - a, along), 0, length)
-    origin = a + foot[:, None] * along
-    axes = [along, across, np.cross(along, across)]
-    rows = [np.column_stack([axis, -_dot(axis, origin)]) for axis in axes]
-    sizes = np.column_stack([foot, length - foot, np.maximum(height, 1e-30)])
-    return np.concatenate([*rows, sizes], axis=1).T
+    across -= _dot(across, along) * along
+    across, _ = _unit(np.where(_dot(across, across) < 0.5, spare, across), spare)
+    origin = a + foot * along
+    for row, axis in enumerate((along, across, _cross(along, across))):
+        frames[4 * row : 4 * row + 3] = axis
+        frames[4 * row + 3] = -_dot(axis, origin)
+    frames[12], frames[13], frames[14] = foot, length - foot, np.maximum(height, _NO_HEIGHT)
 
 
 def _unit(vectors: Floats, spare: Floats) -> tuple[Floats, Floats]:
-    """Return unit vectors, `spare` in place of zeros, and the lengths."""
+    """Return (3, k) unit vectors, `spare` in place of zeros, and the lengths."""
     length = np.sqrt(_dot(vectors, vectors))
     zero = length == 0
-    return np.where(zero[:, None], spare, vectors / np.where(zero, 1, length)[:, None]), length
+    return np.where(zero, spare, vectors / np.where(zero, 1, length)), length
 
 
 def _dot(a: Floats, b: Floats) -> Floats:
-    """Return the dot products of rows."""
-    return np.einsum("ij,ij->i", a, b)
+    """Return the dot products of (3, k) columns."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def _cross(a: Floats, b: Floats) -> Floats:
+    """Return the cross products of (3, k) columns."""
+    return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
 
 
 def _offsets(frame: Floats, points: Floats) -> tuple[Floats, ...]:
@@ -366,13 +374,13 @@ def _slope(base: Floats, height: Floats) -> tuple[Floats, Ints, Floats]:
     return length, height / length, base / length
 
 
-def _squared_distances(frame: Floats, points: Floats) -> Floats:
+def squared_distances(frame: Floats, points: Floats) -> Floats:
     """Return squared distances of (3, ...) points to triangles given by (15, ...) frames."""
     above, below, out, past, *_ = _offsets(frame, points)
     return above * above + below * below + out * out + past * past
 
 
-def _closest_points(frame: Floats, points: Floats) -> Floats:
+def closest_in_triangles(frame: Floats, points: Floats) -> Floats:
     """Return the (3, k) points of triangles closest to (3, k) points."""
     above, below, out, past, side, slope_x, slope_y = _offsets(frame, points)
     along = (out * slope_x - past * slope_y) * side

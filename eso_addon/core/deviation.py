@@ -8,10 +8,11 @@ from dataclasses import asdict, dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .adjacency import sorting_order, unique_edges
+from .adjacency import sorting_order
 from .closest import ClosestPoints
 from .mesh import MeshError, check_mesh, weld
 from .normals import face_area_vectors, lengths
+from .sampling import edge_samples, face_samples
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -113,7 +114,6 @@ class _Surface:
 
     vertices: Floats
     faces: Ints
-    areas: Floats
     normals: Floats
 
     @classmethod
@@ -126,15 +126,16 @@ class _Surface:
         good = areas > 0
         if not good.any():
             raise MeshError(f"the {name} mesh has no surface to measure: it needs a triangle with an area")
-        return cls(points, corners[good], areas[good], vectors[good] / areas[good, None])
+        return cls(points, corners[good], vectors[good] / areas[good, None])
 
 
 def _one_way(source: _Surface, target: _Surface, count: int, rng: np.random.Generator, tie: float) -> OneWay:
     """Measure from samples of the source to the target."""
     corners = source.vertices.take(np.unique(source.faces), axis=0)
-    points, face = _face_samples(source, count, rng)
+    points, face, _ = face_samples(source.vertices, source.faces, count, rng)
+    edges = edge_samples(source.vertices, source.faces, max(count // 2, 1), rng)
     search = ClosestPoints(target.vertices, target.faces)
-    farthest = max(search.query(others)[2].max() for others in (corners, _edge_samples(source, count // 2, rng)))
+    farthest = max(search.query(others)[2].max() for others in (corners, edges))
     closest, hit, squared = search.query(points)
     cosine = _best_cosine(source.normals.take(face, axis=0), closest, hit, target, tie)
     return OneWay(
@@ -143,33 +144,6 @@ def _one_way(source: _Surface, target: _Surface, count: int, rng: np.random.Gene
         rms=float(np.sqrt(squared.mean())),
         normal=float(np.degrees(np.arccos(cosine.clip(-1, 1))).mean()),
     )
-
-
-def _strata(sizes: Floats, count: int, rng: np.random.Generator) -> Ints:
-    """Return (count,) indices, one drawn in each of `count` equal parts of the cumulated sizes."""
-    total = np.cumsum(sizes)
-    index = np.searchsorted(total, (np.arange(count) + rng.random(count)) * (total[-1] / count), side="right")
-    return np.minimum(index, len(sizes) - 1)
-
-
-def _face_samples(surface: _Surface, count: int, rng: np.random.Generator) -> tuple[Floats, Ints]:
-    """Return (count, 3) points spread evenly over the area, and their faces."""
-    face = _strata(surface.areas, count, rng)
-    # the square root makes the points even over a triangle (Osada et al. 2002, Shape distributions, Equation 1)
-    out, turn = np.sqrt(rng.random(count)), rng.random(count)
-    points = np.zeros((count, 3))
-    for corner, weight in enumerate((1 - out, out * (1 - turn), out * turn)):
-        points += weight[:, None] * surface.vertices.take(surface.faces[:, corner].take(face), axis=0)
-    return points, face
-
-
-def _edge_samples(surface: _Surface, count: int, rng: np.random.Generator) -> Floats:
-    """Return (max(count, 1), 3) points spread evenly over the length of the edges."""
-    edges, _ = unique_edges(surface.faces, len(surface.vertices))
-    start, end = surface.vertices.take(edges[:, 0], axis=0), surface.vertices.take(edges[:, 1], axis=0)
-    edge = _strata(lengths(end - start), max(count, 1), rng)
-    along = rng.random((len(edge), 1))
-    return start.take(edge, axis=0) * (1 - along) + end.take(edge, axis=0) * along
 
 
 def _best_cosine(normal: Floats, closest: Floats, hit: Ints, target: _Surface, tie: float) -> Floats:
