@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The contact sheet: every level side by side, flat shaded with its edges drawn, rendered by Cycles without a screen."""
+"""The contact sheet: every level side by side, flat shaded with its edges drawn; Cycles needs no screen."""
 
 from collections.abc import Sequence
 from math import ceil, radians
@@ -135,7 +135,8 @@ def _world() -> bpy.types.World:
     seen.inputs["Color"].default_value = (*_PAPER, 1)
     light.inputs["Color"].default_value = (0.75, 0.83, 1.0, 1)
     light.inputs["Strength"].default_value = 0.5
-    ray, mix, output = nodes.new("ShaderNodeLightPath"), nodes.new("ShaderNodeMixShader"), nodes.new("ShaderNodeOutputWorld")
+    ray, mix = nodes.new("ShaderNodeLightPath"), nodes.new("ShaderNodeMixShader")
+    output = nodes.new("ShaderNodeOutputWorld")
     links.new(ray.outputs["Is Camera Ray"], mix.inputs[0])
     links.new(light.outputs[0], mix.inputs[1])
     links.new(seen.outputs[0], mix.inputs[2])

@@ -49,7 +49,7 @@ class Model(Protocol):
 class OffModel:
     """An .off file on its way to another: no Blender needed."""
 
-    left_behind: list[str] = []  # noqa: RUF012 - never written to
+    left_behind: list[str] = []
 
     def __init__(self, path: Path) -> None:
         from .files.off import FileFormatError, read_off
@@ -132,7 +132,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_engine_words(simplify)
     lod = _add_word(words, "lod", _lod, "write several levels of detail", "IN", "OUT")
     targets = lod.add_mutually_exclusive_group(required=True)
-    targets.add_argument("--ratios", type=_list_of(_ratio), metavar="R,R,…", help="share of the triangles at each level")
+    targets.add_argument("--ratios", type=_list_of(_ratio), metavar="R,R,…", help="share of triangles at each level")
     targets.add_argument("--faces", type=_list_of(_count), metavar="N,N,…", help="triangles at each level")
     targets.add_argument("--errors", type=_list_of(_length), metavar="E,E,…", help="largest deviation at each level")
     lod.add_argument("--profile", choices=PROFILES, default="plain", help="the engine that names the levels")
@@ -207,8 +207,9 @@ def _simplify(args: argparse.Namespace) -> None:
     keyword, value = _target({"ratio": args.ratio, "faces_target": args.faces, "max_error": args.max_error})
     options = _engine_options(args)
 
-    def run(part: "Part", goals: list[float]) -> "list[SimplifyResult]":
-        return [simplify(*part[1:], **{keyword: goals[0]}, **options)]
+    def run(part: "Part", goals: Sequence[float]) -> "list[SimplifyResult]":
+        _, vertices, faces = part
+        return [simplify(vertices, faces, **{keyword: goals[0]}, **options)]
 
     model = _open(args.input, args.output)
     started = time.perf_counter()
@@ -228,8 +229,9 @@ def _lod(args: argparse.Namespace) -> None:
         raise ValueError(f"{profile.label} takes at most {profile.most_levels} levels, not {len(values)}")
     options = _engine_options(args)
 
-    def run(part: "Part", goals: list[float]) -> "list[SimplifyResult]":
-        return lod_chain(*part[1:], **{keyword: goals}, **options)
+    def run(part: "Part", goals: Sequence[float]) -> "list[SimplifyResult]":
+        _, vertices, faces = part
+        return lod_chain(vertices, faces, **{keyword: goals}, **options)
 
     model = _open(args.input, args.output)
     started = time.perf_counter()
@@ -268,7 +270,7 @@ def _run_on_parts(
     parts: "list[Part]",
     keyword: str,
     goals: list[float],
-    run: "Callable[[Part, list[float]], list[SimplifyResult]]",
+    run: "Callable[[Part, Sequence[float]], list[SimplifyResult]]",
 ) -> "list[list[SimplifyResult]]":
     """Simplify each part; give for each level a result for each part.
 
@@ -280,7 +282,7 @@ def _run_on_parts(
     for index in sorted(range(len(parts)), key=lambda index: len(parts[index][2])):
         size = len(parts[index][2])
         is_count = keyword in ("faces_target", "faces_targets")
-        shares = [max(round(goal * size / triangles_left), 1) for goal in left] if is_count else goals
+        shares: Sequence[float] = [max(round(goal * size / triangles_left), 1) for goal in left] if is_count else goals
         try:
             results[index] = run(parts[index], shares)
         except ValueError as error:

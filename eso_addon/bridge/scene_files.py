@@ -57,7 +57,8 @@ class SceneFile:
             raise FileFormatError(f"{path.name} has no visible mesh with faces: nothing to work on")
         pairs = list(zip(self.objects, self.meshes, strict=True))
         self.parts = [(obj.name, mesh.vertices, mesh.triangles) for obj, mesh in pairs]
-        self.left_behind = [f"{o.name}: not carried over: {', '.join(m.left_behind)}" for o, m in pairs if m.left_behind]
+        losses = [(obj.name, ", ".join(mesh.left_behind)) for obj, mesh in pairs if mesh.left_behind]
+        self.left_behind = [f"{name}: not carried over: {names}" for name, names in losses]
 
     def write_simplified(self, path: Path, results: Sequence[Simplified]) -> list[Path]:
         """Put each result in the place of its mesh, and write them all to a file.
