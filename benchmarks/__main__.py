@@ -67,9 +67,9 @@ def main(words: Sequence[str] | None = None) -> int:
     except ValueError:
         parser.error("--ratios takes numbers between 0 and 1, separated by commas")
     wanted = [PEERS[name] for name in _chosen(parser, "peer", told.peers, list(PEERS))]
+    names = _chosen(parser, "mesh", told.meshes, list(meshes))
     skipped = {peer.name: why for peer in wanted if (why := peer.missing())}
     peers = [peer for peer in wanted if peer.name not in skipped]
-    names = _chosen(parser, "mesh", told.meshes, list(meshes))
     plan = Plan({name: meshes[name] for name in names}, ratios, peers, max(1, told.repeat), told.timeout)
     start = time.monotonic()
 

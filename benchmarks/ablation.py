@@ -34,35 +34,38 @@ KINDS = ("maximum", "mean", "normal", "seconds")
 def run_ablation(plan: Plan, say: Callable[[str], None]) -> list[dict[str, Any]]:
     """Run every variant over the meshes and ratios of the plan (its peers are not used); return plain rows."""
     rows: list[dict[str, Any]] = []
-    refused: set[str] = set()
     for name, make in plan.meshes.items():
         mesh = make()
         with tempfile.TemporaryDirectory() as folder:
             cases = MeshRun(name, mesh, Path(folder), plan, say)
             with cases.stack:
-                worker = cases.worker(FIGURES["ablation"])
                 for ratio in plan.ratios:
-                    target = max(4, round(cases.triangles * ratio))
-                    seconds: dict[str, list[float]] = {}
-                    figures: dict[str, dict[str, float]] = {}
-                    for turn in range(plan.repeat):
-                        for variant, options in VARIANTS.items():
-                            answer = {"error": ""} if variant in refused else worker.ask(target, options)
-                            if "error" in answer:
-                                if variant not in refused:
-                                    say(f"{variant}: {answer['error']}")
-                                refused.add(variant)
-                                continue
-                            seconds.setdefault(variant, []).append(answer["seconds"])
-                            if turn == 0:
-                                figures[variant] = deviation(mesh, load(answer))
-                    case = {"mesh": name, "ratio": ratio, "triangles": cases.triangles}
-                    rows += [
-                        {**case, "variant": variant, **figures[variant], "seconds": statistics.median(runs)}
-                        for variant, runs in seconds.items()
-                    ]
-                    say(f"{name} at {ratio:.0%}: {len(seconds)} variants")
+                    found = _level(cases, ratio)
+                    rows += found
+                    say(f"{name} at {ratio:.0%}: {len(found)} of {len(VARIANTS)} variants")
     return rows
+
+
+def _level(cases: MeshRun, ratio: float) -> list[dict[str, Any]]:
+    """Run every variant to one level, in turns; who fails is named and left out of this level."""
+    target = max(4, round(cases.triangles * ratio))
+    seconds: dict[str, list[float]] = {variant: [] for variant in VARIANTS}
+    figures: dict[str, dict[str, float]] = {}
+    for turn in range(cases.plan.repeat):
+        for variant in list(seconds):
+            answer = cases.worker(FIGURES["ablation"]).ask(target, VARIANTS[variant])
+            if "error" in answer:
+                cases.say(f"{cases.name} at {ratio:.0%}: {variant} failed: {answer['error']}")
+                del seconds[variant]
+                continue
+            seconds[variant].append(answer["seconds"])
+            if turn == 0:
+                figures[variant] = deviation(cases.mesh, load(answer))
+    case = {"mesh": cases.name, "ratio": ratio, "triangles": cases.triangles}
+    return [
+        {**case, "variant": variant, **figures[variant], "seconds": statistics.median(runs)}
+        for variant, runs in seconds.items()
+    ]
 
 
 def means(rows: list[dict[str, Any]]) -> dict[str, dict[str, float | None]]:

@@ -81,8 +81,8 @@ class MeshRun:
         np.savez(self.stored, vertices=mesh[0], faces=mesh[1])
 
     def worker(self, peer: Peer) -> Worker:
-        """Return the peer's worker, started when it is first needed."""
-        if peer.name not in self.workers:
+        """Return the peer's worker, started when it is first needed and again after its end."""
+        if peer.name not in self.workers or self.workers[peer.name].ended:
             self.workers[peer.name] = self.stack.enter_context(Worker(peer, self.stored, self.plan.timeout))
         return self.workers[peer.name]
 

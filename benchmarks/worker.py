@@ -42,6 +42,11 @@ class Worker:
         self.process.kill()
         self.process.communicate()
 
+    @property
+    def ended(self) -> bool:
+        """Whether the process is gone: it crashed, or took too long and was ended."""
+        return self.process.poll() is not None
+
     def ask(self, target: int, options: dict[str, Any] | None = None) -> dict[str, Any]:
         """Simplify to `target` triangles; return seconds, peak, faces and out (the .npz file), or error."""
         out = self.mesh.with_name(f"{self.mesh.stem}-{self.peer.name}-{target}.npz".replace(" ", "_"))
@@ -55,6 +60,7 @@ class Worker:
             return {"error": "its process has ended"}
         if not select.select([self.process.stdout], [], [], self.timeout)[0]:
             self.process.kill()
+            self.process.wait()
             return {"error": f"no answer after {self.timeout:g} s"}
         line = self.process.stdout.readline()
         return json.loads(line) if line else {"error": f"its process ended with code {self.process.wait()}"}

@@ -10,7 +10,7 @@ import pytest
 
 from benchmarks import runner, shapes
 from benchmarks.__main__ import main
-from benchmarks.ablation import BASE, means
+from benchmarks.ablation import BASE, VARIANTS, means, run_ablation
 from benchmarks.meter import CLEAR_REFS, Meter
 from benchmarks.peers import PEERS, Peer
 from benchmarks.report import read, write
@@ -138,6 +138,19 @@ def test_the_ablation_compares_with_the_default() -> None:
     found = means([{**case, "variant": BASE, "mean": 2.0}, {**case, "variant": "refit off", "mean": 3.0}])
     assert found["refit off"]["mean"] == pytest.approx(1.5)
     assert found[BASE] == pytest.approx(dict.fromkeys(("maximum", "mean", "normal", "seconds"), 1.0))
+
+
+def test_the_ablation_names_what_fails_and_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(runner, "SAMPLES", 500)
+    for variant in list(VARIANTS):
+        if variant != BASE:
+            monkeypatch.delitem(VARIANTS, variant)
+    monkeypatch.setitem(VARIANTS, "odd", {"method": "no such method"})
+    monkeypatch.setitem(VARIANTS, "even", {"method": "qem"})
+    said: list[str] = []
+    rows = run_ablation(Plan({"tiny": partial(shapes.scan, 300)}, (0.5,), [], repeat=2), said.append)
+    assert [row["variant"] for row in rows] == [BASE, "even"]
+    assert sum("odd failed" in line for line in said) == 1
 
 
 def test_a_peer_that_fails_is_named_and_left_out(tmp_path: Path) -> None:
