@@ -20,6 +20,7 @@ package, report = sys.argv[1:]
 bpy.ops.extensions.package_install_files(filepath=package, repo="user_default", enable_on_install=True)
 assert "bl_ext.user_default.eso_lod" in bpy.context.preferences.addons, "not enabled"
 from bl_ext.user_default.eso_lod import eso_addon
+bpy.ops.wm.read_homefile(use_empty=True)
 bpy.ops.mesh.primitive_monkey_add()
 source = bpy.context.object
 bpy.ops.object.eso_simplify(ratio=0.5)

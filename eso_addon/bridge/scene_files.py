@@ -4,7 +4,9 @@
 import ctypes
 import io
 import os
+import re
 import sys
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from pathlib import Path
@@ -50,7 +52,7 @@ class SceneFile:
             pass  # says why a file cannot be opened better than Blender does
         with quiet(f"cannot read {path.name}"):
             READERS[path.suffix.lower()](path)
-        meshes = [(obj, read_mesh(obj)) for obj in _visible_meshes()]
+            meshes = [(obj, read_mesh(obj)) for obj in _visible_meshes()]
         self.objects: list[bpy.types.Object] = [obj for obj, mesh in meshes if len(mesh.triangles)]
         self.meshes: list[MeshArrays] = [mesh for _, mesh in meshes if len(mesh.triangles)]
         if not self.objects:
@@ -75,9 +77,10 @@ class SceneFile:
         list of Path
             The file written.
         """
-        for obj, mesh, result in zip(self.objects, self.meshes, results, strict=True):
-            replace_mesh(obj, write_mesh(result, mesh, obj.data.name), modifiers_applied=True)
-        write_scene(path, self.objects)
+        with quiet(f"cannot write {path.name}"):
+            for obj, mesh, result in zip(self.objects, self.meshes, results, strict=True):
+                replace_mesh(obj, write_mesh(result, mesh, obj.data.name), modifiers_applied=True)
+            write_scene(path, self.objects)
         return [path]
 
     def write_levels(
@@ -100,6 +103,21 @@ class SceneFile:
         list of Path
             The files written.
         """
+        paths = [path]
+        with quiet(f"cannot write {path.name}"):
+            objects = self._add_levels(levels, name_level)
+            if path.suffix.lower() in NAMELESS:
+                paths = [path.with_stem(name_level(path.stem, index)) for index in range(len(levels))]
+                for level_path, level in zip(paths, objects, strict=True):
+                    write_scene(level_path, level)
+            else:
+                write_scene(path, [obj for level in objects for obj in level])
+        return paths
+
+    def _add_levels(
+        self, levels: Sequence[Sequence[Simplified]], name_level: Callable[[str, int], str]
+    ) -> list[list[bpy.types.Object]]:
+        """Put objects for all levels in the place of the sources."""
         names = self._set_sources_aside()
         collections = [bpy.context.scene.collection]
         objects: list[list[bpy.types.Object]] = []
@@ -114,13 +132,7 @@ class SceneFile:
                 objects[-1].append(level)
         for source in self.objects:
             bpy.data.objects.remove(source)
-        if path.suffix.lower() not in NAMELESS:
-            write_scene(path, [obj for level in objects for obj in level])
-            return [path]
-        paths = [path.with_stem(name_level(path.stem, index)) for index in range(len(levels))]
-        for level_path, level in zip(paths, objects, strict=True):
-            write_scene(level_path, level)
-        return paths
+        return objects
 
     def _set_sources_aside(self) -> list[str]:
         """Give the sources' names, and free them for levels."""
@@ -164,7 +176,7 @@ def write_scene(path: Path, objects: Sequence[bpy.types.Object]) -> None:
 
     Raises
     ------
-    FileFormatError
+    RuntimeError
         If Blender cannot write them.
     OSError
         If the file cannot be written.
@@ -172,7 +184,7 @@ def write_scene(path: Path, objects: Sequence[bpy.types.Object]) -> None:
     view_layer = bpy.context.view_layer
     view_layer.update()
     select_only(list(objects), view_layer)
-    with quiet(f"cannot write {path.name}"), atomic_output(path) as draft:
+    with atomic_output(path) as draft:
         WRITERS[path.suffix.lower()](draft)
 
 
@@ -201,7 +213,8 @@ def quiet(trouble: str) -> Iterator[None]:
         for fd in kept:
             os.dup2(silent, fd)
         # Python's own streams may stand for something else than the process's.
-        with redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()):
+        with redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()), warnings.catch_warnings():
+            warnings.simplefilter("ignore")
             yield
     except RuntimeError as error:
         raise FileFormatError(f"{trouble}: {_last_word(str(error))}") from error
@@ -221,10 +234,10 @@ def _flush() -> None:
 
 
 def _last_word(message: str) -> str:
-    """Take the line that says what happened: the last one of a traceback, the first of anything else."""
+    """Take the line that says what happened: the exception of a traceback, or else the first one."""
     lines = [line.strip() for line in message.splitlines() if line.strip()] or ["Blender does not say why"]
-    line = next((line for line in reversed(lines) if not line.startswith("Location:")), lines[0])
-    return (line if "Traceback" in message else lines[0]).removeprefix("Error: ")
+    exceptions = re.findall(r"^[\w.]*(?:Error|Exception)\b.*", message, flags=re.MULTILINE)
+    return exceptions[-1] if "Traceback" in message and exceptions else lines[0].removeprefix("Error: ")
 
 
 def _start_empty() -> None:
