@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from .mesh import morton_order
 
+Bools = NDArray[np.bool_]
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
@@ -19,7 +20,7 @@ _BEAM = 4  # nodes followed at each level in search of the first bound
 _GROUP = 8  # points that walk together, where they lie dense enough
 _BLOCK_POINTS = 4096  # points that walk at once
 _BLOCK_PAIRS = 4096  # pairs looked at in one step: temporaries stay in the cache, and memory is bounded
-_NO_HEIGHT = 1e-30  # the height of a zero-area triangle: no special case, and no error that counts
+_NO_HEIGHT = 1e-18  # the height of a zero-area triangle: no special case, no error that counts, a square in float32
 _ROUNDING = 1e-12  # slack of the box tests, relative to the size of the mesh
 
 
@@ -106,7 +107,7 @@ class ClosestPoints:
         closest = np.empty_like(points)
         for part in _parts(len(points), _BLOCK_POINTS):
             frame = self._frames.take(np.maximum(slot[part], 0), axis=1)
-            closest[part] = closest_in_triangles(frame, points[part].T).T
+            closest[part] = closest_in_triangles(frame, points[part].T)[0].T
         squared = np.einsum("ij,ij->i", points - closest, points - closest) * self._size**2
         closest *= self._size
         closest += self._center
@@ -267,7 +268,7 @@ def _tree_order(points: Floats) -> Ints:
 def _box_levels(low: Floats, high: Floats) -> list[Floats]:
     """Return (6, _FAN, nodes) centres and half sizes of the children of each node, from the leaves up to the root."""
     low, high = low.reshape(-1, _LEAF, 3).min(axis=1), high.reshape(-1, _LEAF, 3).max(axis=1)
-    levels = []
+    levels: list[Floats] = []
     while len(low) > 1 or not levels:
         short = -len(low) % _FAN
         center = np.concatenate([(low + high) / 2, np.full((short, 3), np.inf)])  # infinitely far away: no child
@@ -380,9 +381,13 @@ def squared_distances(frame: Floats, points: Floats) -> Floats:
     return above * above + below * below + out * out + past * past
 
 
-def closest_in_triangles(frame: Floats, points: Floats) -> Floats:
-    """Return the (3, k) points of triangles closest to (3, k) points."""
+def closest_in_triangles(frame: Floats, points: Floats) -> tuple[Floats, Floats, Bools]:
+    """Return the (3, k) points of triangles closest to (3, k) points, squared distances, and what lies off the side.
+
+    The last, (k,) bool, tells whether the closest point is on the rim, so that another triangle may be nearer.
+    """
     above, below, out, past, side, slope_x, slope_y = _offsets(frame, points)
     along = (out * slope_x - past * slope_y) * side
     across = out * slope_y + past * slope_x + below
-    return points - along * frame[0:3] - across * frame[4:7] - above * frame[8:11]
+    closest = points - along * frame[0:3] - across * frame[4:7] - above * frame[8:11]
+    return closest, above * above + below * below + out * out + past * past, (out > 0) | (below < 0)

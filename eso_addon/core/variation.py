@@ -78,9 +78,8 @@ def angle_defects_and_areas(vertices: Floats, faces: Ints) -> tuple[Floats, Floa
         angles[:, i] = np.arctan2(doubled, np.einsum("ij,ij->i", u, v))
     count = len(vertices)
     sums = np.bincount(faces.ravel(), weights=angles.ravel(), minlength=count)
-    areas = np.bincount(faces.ravel(), weights=np.repeat(0.5 * doubled, 3), minlength=count).astype(np.float64, copy=False)
-    defects = 2.0 * np.pi - sums
-    return defects, areas
+    areas = np.bincount(faces.ravel(), weights=np.repeat(0.5 * doubled, 3), minlength=count)
+    return np.asarray(2.0 * np.pi - sums), np.asarray(areas, dtype=np.float64)
 
 
 def curvature(defects: Floats, areas: Floats) -> Floats:
@@ -148,13 +147,14 @@ def _rows_of_four(vectors: Floats) -> Floats:
 def _add_distances(sums: Floats, rows: Floats, pairs: Pairs) -> None:
     """Add the distance between the rows of each pair to the sums of both its ends."""
     local = np.take(rows, pairs.vertices, axis=0)
-    difference = np.take(local, pairs.other, axis=0)
-    difference -= np.take(local, pairs.one, axis=0)
+    difference = np.take(local, pairs.others, axis=0)
+    difference -= np.repeat(np.take(local, pairs.owners, axis=0), pairs.counts, axis=0)
     difference *= difference
     # adding the halves of rows as complex numbers is several times as quick as a sum along the rows
     halves = difference.view(np.complex128)
     folded = halves[:, 0] + halves[:, 1]
     distance = folded.real + folded.imag
     np.sqrt(distance, out=distance)
-    count = len(pairs.vertices)
-    sums[pairs.vertices] += np.bincount(pairs.one, distance, count) + np.bincount(pairs.other, distance, count)
+    local_sums = np.bincount(pairs.others, distance, len(local))
+    local_sums[pairs.owners] += np.add.reduceat(distance, np.cumsum(pairs.counts) - pairs.counts)
+    np.add.at(sums, pairs.vertices, local_sums)

@@ -1,0 +1,510 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The engine: collapses edges in batches, whole arrays at a time: weigh, choose, test, collapse, update.
+
+A batch holds edges that are cheapest at both their ends, so no two of them share a vertex. It is ordered by cost, and each
+collapse is tested in the state that the cheaper ones of its batch leave: any prefix of the record is a valid mesh.
+
+Faces are three rows of corners; the side from corner j to the next has a cost in row j, finite in one of its two faces only
+(where the corner has the lower number), so edges need no list of their own.
+"""
+
+from collections.abc import Generator
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from .blocks import Blocks
+from .mesh import Bools, Floats, Ints
+from .quadrics import (
+    WIDTH,
+    cross,
+    endpoint_costs,
+    move_memory,
+    optimal_costs,
+    optimal_places,
+)
+from .record import CollapseRecord
+from .variation import angle_defects_and_areas, edge_curvature_factor
+
+_NONE = np.iinfo(np.int64).max
+_LOW = (1 << 32) - 1
+# an odd multiplier and its inverse: ties of cost are broken in no spatial order, and the slot can be read back
+_SCATTER = 0x9E3779B1
+_GATHER = pow(_SCATTER, -1, 1 << 32)
+# faces a block: its arrays stay in the second cache
+_BLOCK = 16384
+_SAMPLES = 8192
+
+
+@dataclass(frozen=True)
+class Rules:
+    """What the engine may do.
+
+    Attributes
+    ----------
+    endpoint : bool
+        Keep one of the two vertices where it stands (half-edge collapse); else move it to the optimal place.
+    memory : float
+        How strongly a vertex holds to its place, relative to its quadric.
+    flip : float
+        Least cosine between a face's normals before and after.
+    guard : bool
+        The link condition: no collapse changes the topology.
+    share : float
+        The part of the edges, the cheapest, from which a batch is chosen.
+    curvature_factor : bool
+        Multiply costs by Equation 5, renewed where collapses change it.
+    """
+
+    endpoint: bool = False
+    memory: float = 1e-7
+    flip: float = 0.2
+    guard: bool = True
+    share: float = 0.4
+    curvature_factor: bool = False
+
+
+@dataclass
+class _State:
+    """The mesh on its way down; n vertices in Morton order, m faces, and a vertex n for dead faces."""
+
+    rules: Rules
+    blocks: Blocks
+    points: Floats  # (n + 1, 4) rows, the last column unused: rows of 32 bytes are gathered fastest
+    quadrics: Floats  # (n, 12)
+    faces: Ints  # (3, m)
+    boundary: Bools  # (n + 1,)
+    locked: Bools | None  # (n,)
+    alive: int
+    costs: np.ndarray = field(init=False)  # (3, m) float32
+    base: np.ndarray = field(init=False)  # (3, m) float32, costs before the curvature factor
+    dead: int = 0
+
+    def __post_init__(self) -> None:
+        count = self.nowhere
+        self.before = self.points.astype(np.float32)
+        self.after = self.before.copy()  # as the batch would have it
+        self.open = bool(self.boundary.any())
+        self.best = np.full(count + 1, _NONE)
+        self.label = ~np.arange(count + 1)  # of vertices in no collapse: negative, each its own
+        self.survivor = np.arange(count + 1)
+        self.owner = np.zeros(4 * count + 8, np.int64)
+
+
+    @property
+    def nowhere(self) -> int:
+        """The vertex of dead faces: one more than there are."""
+        return len(self.points) - 1
+
+
+@dataclass
+class _Batch:
+    """Collapses by rising cost: (c,) arrays, and what they touch block by block."""
+
+    one: Ints
+    other: Ints
+    slot: Ints
+    cost: np.ndarray
+    quadrics: Floats
+    places: Floats  # (c, 4)
+    stays: Bools
+    bad: Bools
+    falling: Ints = field(init=False)
+    touched: list["_Touched"] = field(default_factory=list)
+
+
+@dataclass
+class _Touched:
+    """Faces with a corner in the batch: (t,) indices, (3, t) corners and labels, and the collapse that removes each."""
+
+    face: Ints
+    corner: Ints
+    label: Ints
+    gone: Ints
+    mixed: Ints  # those in several collapses, as places in the arrays above
+
+
+def collapse_steps(points: Floats, faces: Ints, quadrics: Floats, boundary: Bools, locked: Bools | None, target: int,
+                   rules: Rules, blocks: Blocks) -> Generator[int, None, CollapseRecord]:
+    """Collapse edges until `target` faces are left or nothing more can go.
+
+    Parameters
+    ----------
+    points : ndarray, (3, n) float64
+        About the origin and of about unit size, in an order that keeps neighbours together.
+    faces : ndarray, (3, m) int64
+        Corners, in rows.
+    quadrics : ndarray, (n, 12) float64
+    boundary : ndarray, (n,) bool
+        Vertices with a boundary edge.
+    locked : ndarray, (n,) bool, or None
+        Vertices that neither go nor move.
+    target : int
+    rules : Rules
+    blocks : Blocks
+
+    Yields
+    ------
+    int
+        Faces left after each batch.
+
+    Returns
+    -------
+    CollapseRecord
+        Positions are the engine's.
+    """
+    rows = np.zeros((points.shape[1] + 1, 4))
+    rows[:-1, :3] = points.T
+    state = _State(rules, blocks, rows, quadrics.copy(), faces.copy(), np.append(boundary, False), locked,
+                   faces.shape[1])
+    history: list[tuple] = []
+    faces_before = state.alive
+    _weigh(state)
+    fresh = True
+    while state.alive > target:
+        batch = _choose(state)
+        if batch is None:
+            if fresh:
+                break
+            _weigh(state)  # rejected edges may have become possible
+            fresh = True
+            continue
+        _test(state, batch)
+        done = _collapse(state, batch, target)
+        if done is not None:
+            history.append(done)
+            fresh = False
+        yield state.alive
+    return _record(history, faces_before)
+
+
+def _weigh(state: _State) -> None:
+    """Give every side the cost of its edge, in the face where it counts."""
+    count = state.faces.shape[1]
+    state.base = np.full((3, count), np.inf, np.float32)
+
+    def weigh(part: slice) -> None:
+        corner = state.faces[:, part]
+        for side in range(3):
+            start, end = corner[side], corner[(side + 1) % 3]
+            chosen = np.flatnonzero(_counts(state, start, end))
+            state.base[side, part][chosen] = _edge_costs(state, start.take(chosen), end.take(chosen))
+
+    state.blocks.map(weigh, count, _BLOCK)
+    _apply_factor(state)
+
+
+def _counts(state: _State, start: Ints, end: Ints) -> Bools:
+    """Tell the sides that carry their edge's cost: one of two, but each where a boundary may have left it alone."""
+    lower = start < end
+    return lower | (state.boundary.take(start) & state.boundary.take(end)) if state.open else lower
+
+
+def _edge_costs(state: _State, one: Ints, other: Ints) -> np.ndarray:
+    locked = state.locked
+    if state.rules.endpoint:
+        at_one, at_other = endpoint_costs(state.quadrics, state.points, one, other)
+        if locked is not None:
+            at_other[locked.take(one)] = np.inf
+            at_one[locked.take(other)] = np.inf
+        return np.minimum(at_one, at_other)
+    costs = optimal_costs(state.quadrics, one, other)
+    if locked is not None:
+        held = np.flatnonzero(locked.take(one) | locked.take(other))
+        at_one, at_other = endpoint_costs(state.quadrics, state.points, one.take(held), other.take(held))
+        holds_one, holds_other = locked.take(one.take(held)), locked.take(other.take(held))
+        costs[held] = np.where(holds_one, np.where(holds_other, np.inf, at_one), at_other)
+    return costs
+
+
+def _apply_factor(state: _State) -> None:
+    """Multiply by the curvature factor of Equation 5, as it is now."""
+    if not state.rules.curvature_factor:
+        state.costs = state.base
+        return
+    alive = np.flatnonzero(state.faces[0] < state.nowhere)
+    defects, areas = angle_defects_and_areas(state.points[:-1, :3], state.faces.take(alive, axis=1).T)
+    ends = np.stack((state.faces, np.roll(state.faces, -1, axis=0)), axis=-1).reshape(-1, 2)
+    finite = np.flatnonzero(np.isfinite(state.base.ravel()))
+    state.costs = state.base.copy()
+    state.costs.ravel()[finite] *= edge_curvature_factor(defects, areas, ends.take(finite, axis=0)).astype(np.float32)
+
+
+def _choose(state: _State) -> _Batch | None:
+    """Choose the edges that are the cheapest at both ends, among the cheapest part of all."""
+    costs = state.costs.ravel()
+    sample = costs[:: max(len(costs) // _SAMPLES, 1)]
+    sample = sample[np.isfinite(sample)]
+    if len(sample) < 64:
+        sample = costs[np.isfinite(costs)]
+        if len(sample) == 0:
+            return None
+    rank = int(state.rules.share * (len(sample) - 1))
+    threshold = np.partition(sample, rank)[rank]
+    one, other, keys = _candidates(state, threshold)
+    np.minimum.at(state.best, one, keys)
+    np.minimum.at(state.best, other, keys)
+    best = np.flatnonzero((state.best.take(one) == keys) & (state.best.take(other) == keys))
+    state.best[one] = _NONE
+    state.best[other] = _NONE
+    keys = np.sort(keys.take(best))
+    slot = ((keys & _LOW) * _GATHER) & _LOW
+    return _place(state, slot, (keys >> 32).astype(np.int32).view(np.float32))
+
+
+def _candidates(state: _State, threshold: np.float32) -> tuple[Ints, Ints, Ints]:
+    """Return both vertices of the edges up to a cost, and keys that order them: cost above, scattered slot below."""
+    width = state.faces.shape[1]
+
+    def find(part: slice) -> list:
+        found = []
+        for side in range(3):
+            face = np.flatnonzero(state.costs[side, part] <= threshold) + part.start
+            keys = state.costs[side].take(face).view(np.int32).astype(np.int64) << 32
+            keys |= ((face + side * width) * _SCATTER) & _LOW
+            found.append((state.faces[side].take(face), state.faces[(side + 1) % 3].take(face), keys))
+        return found
+
+    found = [side for block in state.blocks.map(find, width, _BLOCK) for side in block]
+    one, other, keys = (np.concatenate(rows) for rows in zip(*found, strict=True))
+    return one, other, keys
+
+
+def _ends(faces: Ints, slots: Ints) -> tuple[Ints, Ints]:
+    corners = faces.ravel()
+    following = slots + faces.shape[1]
+    np.subtract(following, len(corners), out=following, where=following >= len(corners))
+    return corners.take(slots), corners.take(following)
+
+
+def _place(state: _State, slot: Ints, cost: np.ndarray) -> _Batch:
+    """Find where the vertex of each chosen edge is to stand, and which of the two goes."""
+    one, other = _ends(state.faces, slot)
+    count = len(slot)
+    batch = _Batch(one, other, slot, cost, np.empty((count, WIDTH)), np.zeros((count, 4)), np.zeros(count, bool),
+                   np.zeros(count, bool))
+
+    def place(part: slice) -> None:
+        one, other = batch.one[part], batch.other[part]
+        first, second = state.quadrics.take(one, axis=0), state.quadrics.take(other, axis=0)
+        starts, ends = state.points.take(one, axis=0).T[:3], state.points.take(other, axis=0).T[:3]
+        summed = first + second
+        swap, stays = _stays(state, one, other)
+        places = starts
+        if stays.any():
+            places = np.where(swap, ends, starts)
+            batch.one[part], batch.other[part] = np.where(swap, other, one), np.where(swap, one, other)
+        if not stays.all():
+            places = np.where(stays, places, optimal_places(summed)) if stays.any() else optimal_places(summed)
+        move_memory(summed, first, second, starts, ends, places, state.rules.memory)
+        batch.quadrics[part], batch.places[part, :3], batch.stays[part] = summed, places.T, stays
+
+    state.blocks.map(place, count, _BLOCK // 4)
+    return batch
+
+
+def _stays(state: _State, one: Ints, other: Ints) -> tuple[Bools, Bools]:
+    """Tell where the second vertex is the one to keep, and where the kept vertex may not move."""
+    stays = np.full(len(one), state.rules.endpoint)
+    swap = np.zeros(len(one), bool)
+    if state.rules.endpoint:
+        at_one, at_other = endpoint_costs(state.quadrics, state.points, one, other)
+        swap = at_other < at_one
+    if state.locked is not None:
+        holds_one, holds_other = state.locked.take(one), state.locked.take(other)
+        stays |= holds_one | holds_other
+        swap = np.where(holds_one | holds_other, holds_other, swap)
+    return swap, stays
+
+
+def _test(state: _State, batch: _Batch) -> None:
+    """Mark the collapses that would turn a face over or change the topology."""
+    count = len(batch.one)
+    state.label[batch.one] = state.label[batch.other] = np.arange(count)
+    state.survivor[batch.other] = batch.one
+    state.after[batch.one] = state.after[batch.other] = batch.places.astype(np.float32)
+
+    def test(part: slice) -> tuple[_Touched, Ints, Ints, tuple[Ints, Ints, Ints]]:
+        touched = _touched(state, part)
+        falling = touched.gone.take(np.flatnonzero(touched.gone != _NONE))
+        return touched, falling, _flips(state, touched.corner, touched.label), _link_pairs(state, touched)
+
+    tested = state.blocks.map(test, state.faces.shape[1], _BLOCK)
+    batch.touched = [touched for touched, _, _, _ in tested]
+    batch.falling = np.bincount(np.concatenate([falling for _, falling, _, _ in tested]), minlength=count)
+    if state.rules.guard:
+        _break_links(state, batch, [pairs for _, _, _, pairs in tested])
+    rejected = batch.bad.copy()
+    for _, _, flipped, _ in tested:
+        rejected[flipped] = True
+    _reject(state, batch, rejected)
+
+
+def _touched(state: _State, part: slice) -> _Touched:
+    corner = state.faces[:, part]
+    labels = [state.label.take(row) for row in corner]
+    face = np.flatnonzero(np.maximum(np.maximum(labels[0], labels[1]), labels[2]) >= 0)
+    label = np.stack([row.take(face) for row in labels])
+    gone = _removers(label)
+    collapses = (label >= 0).view(np.int8)
+    mixed = np.flatnonzero(collapses[0] + collapses[1] + collapses[2] - (gone != _NONE) > 1)
+    return _Touched(face + part.start, np.stack([row.take(face) for row in corner]), label, gone, mixed)
+
+
+def _removers(label: Ints) -> Ints:
+    """Return the collapse that has two corners of each face, else none."""
+    first, second, third = label
+    by_first = (first == second) | (first == third)
+    return np.where(by_first, first, np.where(second == third, second, _NONE))
+
+
+def _flips(state: _State, corner: Ints, label: Ints) -> Ints:
+    """Return the collapses, the dearest of each face, that together turn a face too far."""
+    old = _normals(state.before, corner)
+    new = _normals(state.after, corner)
+    turn = old[0] * new[0] + old[1] * new[1] + old[2] * new[2]
+    lengths = (old[0] * old[0] + old[1] * old[1] + old[2] * old[2]) * (new[0] * new[0] + new[1] * new[1] + new[2] * new[2])
+    flipped = np.flatnonzero(turn * np.abs(turn) < np.float32(state.rules.flip**2) * lengths)
+    return label.take(flipped, axis=1).max(axis=0, initial=-1)
+
+
+def _normals(rows: np.ndarray, corner: Ints) -> tuple:
+    base = rows.take(corner[0], axis=0)
+    return cross((rows.take(corner[1], axis=0) - base).T, (rows.take(corner[2], axis=0) - base).T)
+
+
+def _link_pairs(state: _State, touched: _Touched) -> tuple[Ints, Ints, Ints]:
+    """Return, for each corner in a collapse of the faces that stay, its collapse and the two vertices across."""
+    corner = [state.survivor.take(row) for row in touched.corner]
+    stays = touched.gone == _NONE
+    pairs = []
+    for side in range(3):
+        chosen = np.flatnonzero((touched.label[side] >= 0) & stays)
+        pairs.append((touched.label[side].take(chosen), corner[(side + 1) % 3].take(chosen),
+                      corner[(side + 2) % 3].take(chosen)))
+    own, following, preceding = (np.concatenate(rows) for rows in zip(*pairs, strict=True))
+    return own, following, preceding
+
+
+def _break_links(state: _State, batch: _Batch, pairs: list) -> None:
+    """Reject what breaks the link condition: around the merged vertex each ring vertex must come once."""
+    own, following, preceding = (np.concatenate(rows) for rows in zip(*pairs, strict=True))
+    count = len(batch.one)
+    faces_left = np.bincount(own, minlength=count)
+    both_on_boundary = state.boundary.take(batch.one) & state.boundary.take(batch.other)
+    closed = batch.falling > 1
+    batch.bad |= np.where(closed, (faces_left < 3) | both_on_boundary, faces_left < 1)
+    # two writers of one place are rare: only they are sorted
+    place = following * 4 + (own & 3)
+    numbers = np.arange(len(place))
+    state.owner[place] = numbers
+    lost = np.flatnonzero(state.owner.take(place) != numbers)
+    suspect = np.zeros(len(state.owner), bool)
+    suspect[place.take(lost)] = True
+    rivals = np.flatnonzero(suspect.take(place))
+    batch.bad[_repeated((own.take(rivals) << 32) | following.take(rivals)) >> 32] = True
+    # an open fan must stay open: its last vertex must not be its first
+    at_boundary = np.flatnonzero(~closed.take(own) & both_on_boundary.take(own))
+    own = own.take(at_boundary)
+    ring = np.concatenate(((own << 32) | following.take(at_boundary), (own << 32) | preceding.take(at_boundary)))
+    distinct = np.bincount(np.unique(ring) >> 32, minlength=count)
+    batch.bad |= (distinct > 0) & (distinct != faces_left + 1)
+
+
+def _repeated(keys: Ints) -> Ints:
+    keys = np.sort(keys)
+    return keys[1:][keys[1:] == keys[:-1]]
+
+
+def _reject(state: _State, batch: _Batch, rejected: Bools) -> None:
+    """Take collapses out of the batch, and test their faces again without them, until no more turn over."""
+    while rejected.any():
+        batch.bad |= rejected
+        for end in (batch.one[rejected], batch.other[rejected]):
+            state.after[end] = state.before[end]
+            state.label[end] = ~end
+            state.survivor[end] = end
+        outcast = np.append(False, rejected)
+        rejected = np.zeros(len(batch.bad), bool)
+        for touched in batch.touched:
+            hit = outcast.take(touched.label.take(touched.mixed, axis=1) + 1, mode="clip").any(axis=0)
+            corner = touched.corner.take(touched.mixed[hit], axis=1)
+            label = state.label.take(corner)
+            left = np.flatnonzero((label >= 0).any(axis=0))
+            rejected[_flips(state, corner.take(left, axis=1), label.take(left, axis=1))] = True
+
+
+def _collapse(state: _State, batch: _Batch, target: int) -> tuple | None:
+    """Carry out the batch, as far as the target asks, and renew what it touched."""
+    falling = np.where(batch.bad, 0, batch.falling)
+    removed = np.cumsum(falling)
+    late = np.zeros(len(removed), bool)
+    late[np.searchsorted(removed, state.alive - target) + 1 :] = True
+    late &= ~batch.bad
+    if late.any():
+        _reject(state, batch, late)
+    chosen = np.flatnonzero(~batch.bad)
+    kept, gone, places = batch.one.take(chosen), batch.other.take(chosen), batch.places.take(chosen, axis=0)
+    state.quadrics[kept] = batch.quadrics.take(chosen, axis=0)
+    state.points[kept] = places
+    state.before[kept] = places
+    state.boundary[kept] |= state.boundary[gone]
+    _update(state, batch)
+    state.base.ravel()[batch.slot[batch.bad]] = np.inf
+    state.label[kept], state.label[gone] = ~kept, ~gone
+    if len(chosen) == 0:
+        return None
+    faces_left = state.alive - removed.take(chosen)
+    state.dead += state.alive - int(faces_left[-1])
+    state.alive = int(faces_left[-1])
+    if state.dead > state.faces.shape[1] // 4:
+        _pack(state)
+    _apply_factor(state)
+    return gone, kept, places[:, :3], faces_left, batch.cost.take(chosen), batch.stays.take(chosen)
+
+
+def _update(state: _State, batch: _Batch) -> None:
+    """Replace the corners that went, drop the faces that fell, and weigh the sides whose vertices changed."""
+    nowhere = state.nowhere
+    falling = np.append(~batch.bad, False)  # no remover clips to the last,
+    done = np.append(False, ~batch.bad)  # and no collapse to the first
+
+    def update(block: slice) -> None:
+        touched = batch.touched[block.start]
+        falls = falling.take(touched.gone, mode="clip")
+        fallen = touched.face.take(np.flatnonzero(falls))
+        staying = np.flatnonzero(~falls)
+        face = touched.face.take(staying)
+        corner = [state.survivor.take(row.take(staying)) for row in touched.corner]
+        changed = [done.take(row.take(staying) + 1, mode="clip") for row in touched.label]
+        for side in range(3):
+            faces, base = state.faces[side], state.base[side]
+            faces[fallen] = nowhere
+            base[fallen] = np.inf
+            faces[face] = corner[side]
+            stale = np.flatnonzero(changed[side] | changed[(side + 1) % 3])
+            place, start, end = face.take(stale), corner[side].take(stale), corner[(side + 1) % 3].take(stale)
+            base[place] = np.inf
+            weighed = np.flatnonzero(_counts(state, start, end))
+            base[place.take(weighed)] = _edge_costs(state, start.take(weighed), end.take(weighed))
+
+    state.blocks.map(update, len(batch.touched), 1)
+
+
+def _pack(state: _State) -> None:
+    alive = np.flatnonzero(state.faces[0] < state.nowhere)
+    state.faces = state.faces.take(alive, axis=1)
+    state.base = state.base.take(alive, axis=1)
+    state.dead = 0
+
+
+def _record(history: list[tuple], faces_before: int) -> CollapseRecord:
+    if not history:
+        none = np.zeros(0, np.int64)
+        return CollapseRecord(none, none, np.zeros((0, 3)), none, np.zeros(0, np.float32), none, faces_before,
+                              np.zeros(0, bool))
+    removed, kept, places, faces_left, cost, stays = zip(*history, strict=True)
+    starts = np.cumsum([0] + [len(part) for part in removed[:-1]])
+    return CollapseRecord(np.concatenate(removed), np.concatenate(kept), np.concatenate(places),
+                          np.concatenate(faces_left), np.concatenate(cost), starts, faces_before,
+                          np.concatenate(stays))

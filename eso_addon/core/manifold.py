@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Where a mesh is open, and faces that are wound against their neighbours."""
+
+import numpy as np
+
+from .adjacency import components, sorting_order
+from .mesh import Bools, Ints
+
+
+def open_vertices(faces: Ints, count: int) -> Bools:
+    """Find vertices with a side that no other face runs back along: at boundaries, odd and inconsistent edges.
+
+    Each face runs along its sides; where the surface is closed and wound consistently, as many sides run from a to b as
+    from b to a. Sums of hashed neighbours on either way tell the vertices where that fails, without a sort of the edges.
+
+    Parameters
+    ----------
+    faces : ndarray, (3, m) int64
+    count : int
+        Number of vertices.
+
+    Returns
+    -------
+    ndarray, (count,) bool
+    """
+    mixed = np.arange(1, count + 1, dtype=np.uint64) * np.uint64(0x9E3779B97F4A7C15)
+    mixed = (mixed ^ (mixed >> np.uint64(29))) * np.uint64(0xBF58476D1CE4E5B9)
+    hashed = (mixed >> np.uint64(24)).astype(np.float64)
+    corners = faces.ravel()
+    values = hashed.take(corners)
+    width = faces.shape[1]
+    following = np.concatenate((values[width:], values[:width]))
+    preceding = np.concatenate((values[2 * width :], values[: 2 * width]))
+    # whole numbers below 2 to the 53rd add up exactly; beyond that a vertex may be named in vain
+    return np.bincount(corners, following, count) != np.bincount(corners, preceding, count)
+
+
+def boundary_sides(faces: Ints, opened: Bools) -> Ints:
+    """Return the sides with no other face, as slots j * m + face, (b,) int64, of (3, m) faces.
+
+    Parameters
+    ----------
+    faces : ndarray, (3, m) int64
+    opened : ndarray, (n,) bool
+        From `open_vertices`; only sides between two such vertices are looked at.
+    """
+    start, end = faces.ravel(), np.roll(faces, -1, axis=0).ravel()
+    slots = np.flatnonzero(opened.take(start) & opened.take(end))
+    start, end = start.take(slots), end.take(slots)
+    keys = np.minimum(start, end) * len(opened) + np.maximum(start, end)
+    order = np.argsort(keys, kind="stable")
+    keys = keys.take(order)
+    alone = np.ones(len(keys), bool)
+    same = keys[1:] == keys[:-1]
+    alone[1:] &= ~same
+    alone[:-1] &= ~same
+    return slots.take(np.sort(order[alone]))
+
+
+def orient(faces: Ints, count: int) -> Bools:
+    """Find the faces to turn over so that neighbours run along their common edge in opposite ways.
+
+    Parameters
+    ----------
+    faces : ndarray, (3, m) int64
+    count : int
+        Number of vertices.
+
+    Returns
+    -------
+    ndarray, (m,) bool
+        Of each connected part the fewer faces are turned. On a surface with one side (Möbius) some edges stay as they are.
+    """
+    width = faces.shape[1]
+    start, end = faces.ravel(), np.roll(faces, -1, axis=0).ravel()
+    keys = np.minimum(start, end) * count + np.maximum(start, end)
+    order = sorting_order(keys)
+    keys = keys.take(order)
+    first = np.flatnonzero(np.concatenate(([True], keys[1:] != keys[:-1])))
+    pairs = first[np.diff(np.append(first, len(keys))) == 2]
+    one, other = order.take(pairs), order.take(pairs + 1)
+    against = (start.take(one) == start.take(other)).astype(np.int8)
+    one, other = one % width, other % width
+    turned = np.full(width, -1, np.int8)
+    part = components(width, one, other)
+    seeds = np.full(part.max(initial=-1) + 1, width)
+    np.minimum.at(seeds, part, np.arange(width))
+    turned[seeds] = 0
+    while len(one):  # each round settles the neighbours of the faces that are settled
+        known, beyond = turned.take(one), turned.take(other)
+        forth, back = (known >= 0) & (beyond < 0), (known < 0) & (beyond >= 0)
+        turned[other[forth]] = known[forth] ^ against[forth]
+        turned[one[back]] = beyond[back] ^ against[back]
+        left = np.flatnonzero((known < 0) & (beyond < 0))
+        one, other, against = one.take(left), other.take(left), against.take(left)
+    most = np.bincount(part, turned) * 2 > np.bincount(part)
+    return (turned == 1) ^ most.take(part)
+
+
+def winding_conflicts(faces: Ints, opened: Bools) -> bool:
+    """Tell whether two faces alone at an edge run along it the same way; arguments as of `boundary_sides`."""
+    start, end = faces.ravel(), np.roll(faces, -1, axis=0).ravel()
+    slots = np.flatnonzero(opened.take(start) & opened.take(end))
+    if len(slots) == 0:
+        return False
+    start, end = start.take(slots), end.take(slots)
+    keys = np.sort(((np.minimum(start, end) * len(opened) + np.maximum(start, end)) << 1) | (start < end))
+    edges = keys >> 1
+    pair = (edges[1:] == edges[:-1]) & (keys[1:] == keys[:-1])
+    before = np.concatenate(([False], edges[1:-1] == edges[:-2])) if len(edges) > 1 else np.zeros(0, bool)
+    after = np.concatenate((edges[2:] == edges[1:-1], [False])) if len(edges) > 1 else np.zeros(0, bool)
+    return bool((pair & ~before & ~after).any())

@@ -1,0 +1,199 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Quadric error metrics (Garland and Heckbert; paper one, Equations 1 to 3 and 9) for arrays of vertices and edges.
+
+A quadric is a row of ten numbers, `a11 a12 a13 a22 a23 a33 b1 b2 b3 c`: the error at x is xᵀAx + 2bᵀx + c. Rows have two
+spare columns: a gather of 96 bytes is faster than one of 80.
+"""
+
+import numpy as np
+
+from .mesh import Floats, Ints
+
+WIDTH = 12
+_PAIRS = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
+_DIAGONAL = (0, 3, 5)
+# edges a block: two blocks of rows stay in the processor's second cache
+_BLOCK = 8192
+_TINY = 1e-30
+
+
+def plane_quadrics(points: Floats, faces: Ints, *, area_weighted: bool) -> Floats:
+    """Sum the squared-distance matrices of the faces around each vertex (Equations 1 to 3).
+
+    Every plane goes through its own vertex, so relative to the vertex only the 3 by 3 part is not zero.
+
+    Parameters
+    ----------
+    points : ndarray, (3, n) float64
+    faces : ndarray, (3, m) int64
+    area_weighted : bool
+        Weigh each plane by its face's area; without it by one, as the papers print it.
+
+    Returns
+    -------
+    ndarray, (6, n) float64
+        a11 a12 a13 a22 a23 a33.
+    """
+    normals, areas = area_normals(points, faces)
+    scale = np.where(areas > 0, (areas if area_weighted else 1.0) / np.maximum(areas * areas, 1e-300), 0.0)
+    corners = faces.ravel()
+    parts = np.empty((6, points.shape[1]))
+    for part, (i, j) in zip(parts, _PAIRS, strict=True):
+        part[:] = np.bincount(corners, np.tile(normals[i] * normals[j] * scale, 3), points.shape[1])
+    return parts
+
+
+def area_normals(points: Floats, faces: Ints) -> tuple[Floats, Floats]:
+    """Return (3, m) face normals of the length of the area, and the (m,) areas; points are (3, n), faces (3, m)."""
+    base = [axis.take(faces[0]) for axis in points]
+    one = [axis.take(faces[1]) - start for axis, start in zip(points, base, strict=True)]
+    two = [axis.take(faces[2]) - start for axis, start in zip(points, base, strict=True)]
+    normals = np.array(cross(one, two))
+    normals *= 0.5
+    return normals, np.sqrt((normals * normals).sum(axis=0))
+
+
+def cross(a, b):  # noqa: ANN001, ANN201 - any three components of one length
+    """Cross product by components: a, b and the result are triples of arrays."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+def boundary_quadrics(points: Floats, normals: Floats, edges: Ints, weight: float) -> Floats:
+    """Planes through boundary edges, perpendicular to their faces, summed at both ends.
+
+    Parameters
+    ----------
+    points : ndarray, (3, n) float64
+    normals : ndarray, (3, b) float64
+        Unit normal of the one face at each edge.
+    edges : ndarray, (2, b) int64
+    weight : float
+        Each plane weighs so many times the squared length of its edge.
+
+    Returns
+    -------
+    ndarray, (6, n) float64
+    """
+    along = points[:, edges[1]] - points[:, edges[0]]
+    across = cross(along, normals)  # as long as the edge: its square is the weight by squared length
+    parts = np.empty((6, points.shape[1]))
+    for part, (i, j) in zip(parts, _PAIRS, strict=True):
+        part[:] = np.bincount(edges.ravel(), np.tile(weight * across[i] * across[j], 2), points.shape[1])
+    return parts
+
+
+def anchored(parts: Floats, points: Floats, memory: float) -> Floats:
+    """Turn 3 by 3 parts about each vertex into quadrics, with a faint memory of where the vertex stands.
+
+    The memory, `memory` times the trace times the squared distance from the vertex, makes every system solvable and lets
+    a flat region collapse its short edges first instead of in random order.
+
+    Parameters
+    ----------
+    parts : ndarray, (6, n) float64
+    points : ndarray, (3, n) float64
+    memory : float
+
+    Returns
+    -------
+    ndarray, (n, 12) float64
+    """
+    quadrics = np.zeros((points.shape[1], WIDTH))
+    trace = parts[0] + parts[3] + parts[5]
+    for column in range(6):
+        quadrics[:, column] = parts[column]
+    for column in _DIAGONAL:
+        quadrics[:, column] += memory * trace + _TINY
+    _set_linear(quadrics, points)
+    return quadrics
+
+
+def _set_linear(quadrics: Floats, points: Floats) -> None:
+    a11, a12, a13, a22, a23, a33 = quadrics.T[:6]
+    x, y, z = points
+    quadrics[:, 6] = -(a11 * x + a12 * y + a13 * z)
+    quadrics[:, 7] = -(a12 * x + a22 * y + a23 * z)
+    quadrics[:, 8] = -(a13 * x + a23 * y + a33 * z)
+    quadrics[:, 9] = -(quadrics[:, 6] * x + quadrics[:, 7] * y + quadrics[:, 8] * z)
+
+
+def move_memory(merged: Floats, one: Floats, other: Floats, starts: Floats, ends: Floats, places: Floats,
+                memory: float) -> None:
+    """Move the memory of merged quadrics from where the two vertices stood to where the one stands, in place.
+
+    Parameters
+    ----------
+    merged : ndarray, (e, 12) float64
+        Sum of `one` and `other`; changed.
+    one, other : ndarray, (e, 12) float64
+    starts, ends, places : ndarray, (3, e) float64
+        Positions of the two vertices, and of the vertex that they became.
+    memory : float
+    """
+    share = memory / (1 + 3 * memory)
+    pull_one = share * one[:, _DIAGONAL].sum(axis=1)
+    pull_other = share * other[:, _DIAGONAL].sum(axis=1)
+    pull = pull_one + pull_other
+    for axis in range(3):
+        merged[:, 6 + axis] += pull_one * starts[axis] + pull_other * ends[axis] - pull * places[axis]
+    merged[:, 9] += (pull * (places * places).sum(axis=0) - pull_one * (starts * starts).sum(axis=0)
+                     - pull_other * (ends * ends).sum(axis=0))
+
+
+def _eliminate(q):  # noqa: ANN001, ANN202 - ten columns of one length
+    """LDLᵀ of A with the pivots' inverses, and the forward substitution of b: stable where Cramer's rule is not."""
+    a11, a12, a13, a22, a23, a33, b1, b2, b3, _ = q
+    r1 = 1.0 / a11
+    l21 = a12 * r1
+    l31 = a13 * r1
+    r2 = 1.0 / (a22 - l21 * a12)
+    e23 = a23 - l31 * a12
+    l32 = e23 * r2
+    r3 = 1.0 / (a33 - l31 * a13 - l32 * e23)
+    y2 = b2 - l21 * b1
+    y3 = b3 - l31 * b1 - l32 * y2
+    return l21, l31, l32, r1, r2, r3, y2, y3
+
+
+def optimal_costs(quadrics: Floats, one: Ints, other: Ints) -> np.ndarray:
+    """Return the least error of each edge's summed quadric, (e,) float32; `one`, `other` are (e,) vertices."""
+    costs = np.empty(len(one), np.float32)
+    for start in range(0, len(one), _BLOCK):
+        part = slice(start, start + _BLOCK)
+        summed = quadrics.take(one[part], axis=0)
+        summed += quadrics.take(other[part], axis=0)
+        q = summed.T[:10]
+        _, _, _, r1, r2, r3, y2, y3 = _eliminate(q)
+        costs[part] = q[9] - q[6] * q[6] * r1 - y2 * y2 * r2 - y3 * y3 * r3
+    return np.maximum(costs, 0, out=costs)
+
+
+def optimal_places(summed: Floats) -> Floats:
+    """Return where each summed quadric, (e, 12), is least: (3, e) float64."""
+    q = summed.T[:10]
+    l21, l31, l32, r1, r2, r3, y2, y3 = _eliminate(q)
+    z = -y3 * r3
+    y = -y2 * r2 - l32 * z
+    x = -q[6] * r1 - l21 * y - l31 * z
+    return np.array((x, y, z))
+
+
+def errors_at(summed: Floats, places: Floats) -> Floats:
+    """Return the error of each quadric, (e, 12), at its place, (3, e): (e,) float64."""
+    a11, a12, a13, a22, a23, a33, b1, b2, b3, c = summed.T[:10]
+    x, y, z = places
+    return (x * (a11 * x + 2 * (a12 * y + a13 * z + b1)) + y * (a22 * y + 2 * (a23 * z + b2))
+            + z * (a33 * z + 2 * b3) + c)
+
+
+def endpoint_costs(quadrics: Floats, points: Floats, one: Ints, other: Ints) -> tuple[np.ndarray, np.ndarray]:
+    """Return each edge's summed quadric at its ends: (e,) float32 at `one` and at `other`; points are (n, 4) rows."""
+    at_one = np.empty(len(one), np.float32)
+    at_other = np.empty(len(one), np.float32)
+    for start in range(0, len(one), _BLOCK):
+        part = slice(start, start + _BLOCK)
+        summed = quadrics.take(one[part], axis=0)
+        summed += quadrics.take(other[part], axis=0)
+        at_one[part] = errors_at(summed, points.take(one[part], axis=0).T[:3])
+        at_other[part] = errors_at(summed, points.take(other[part], axis=0).T[:3])
+    return np.maximum(at_one, 0, out=at_one), np.maximum(at_other, 0, out=at_other)

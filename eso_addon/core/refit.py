@@ -1,0 +1,299 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Moves the vertices of a simplified mesh so that its surface fits samples of the original one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .adjacency import boundary_vertices, sorting_order, stars
+from .closest import ClosestPoints, closest_in_triangles, squared_distances, triangle_frames
+from .normals import face_area_vectors, face_areas, lengths
+
+Bools = NDArray[np.bool_]
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+_ROUNDS = 2
+_PER_FACE = 20  # samples wanted for each simplified face
+_DAMPING = 0.5  # pull towards the present position, relative to what evenly spread samples weigh
+_STEPS = 6  # of conjugate gradients: each round starts near the answer, more change nothing
+_TURN = 0.5  # least cosine between a face's normals before and after a round
+_SHAPE = 0.5  # least area over squared edges after a round, relative to the one before
+_HALVINGS = 4
+_FAR = 9.0  # times the median squared distance
+_BLOCK = 2048
+
+
+def refit(
+    vertices: Floats,
+    faces: Ints,
+    original_vertices: Floats,
+    original_faces: Ints,
+    *,
+    vertex_map: Ints | None = None,
+    fixed: Bools | None = None,
+    rounds: int = _ROUNDS,
+) -> Floats:
+    """Fit a simplified mesh to its original by moving its vertices.
+
+    Each round finds the closest point on the simplified surface for samples of the original, then solves a damped
+    least squares for the positions with those correspondences held (Hoppe et al. 1993, Mesh optimization, section 4.1).
+    No face flips or turns into a sliver, and the largest distance of a sample does not rise.
+
+    Parameters
+    ----------
+    vertices, faces : (k, 3) float64 and (m, 3) int64
+        The simplified mesh.
+    original_vertices, original_faces : (n, 3) float64 and (p, 3) int64
+        What it came from.
+    vertex_map : (n,) int64, optional
+        The simplified vertex each original vertex was collapsed into, -1 if none: spares a search over the mesh.
+    fixed : (k,) bool, optional
+        Vertices that must stay; boundary vertices always do.
+    rounds : int
+
+    Returns
+    -------
+    (k, 3) float64
+        The new positions; fixed vertices have theirs bit for bit.
+    """
+    held = boundary_vertices(faces, len(vertices))
+    if fixed is not None:
+        held |= fixed
+    if rounds < 1 or held.all() or not face_area_vectors(original_vertices, original_faces).any():
+        return vertices.copy()
+    # unit size and the origin in the middle keep the precision of small parts of large scenes
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    center, size = (low + high) / 2, float((high - low).max()) or 1.0
+    samples, weights, corner = _samples(original_vertices, original_faces, _PER_FACE * len(faces))
+    # single precision decides which face is near: it takes half the time, and positions are solved in double
+    points = np.ascontiguousarray(((samples - center) / size).T, dtype=np.float32)
+    start = (vertices - center) / size
+    face = _first_faces(start, faces, points, None if vertex_map is None else vertex_map.take(corner))
+    moved = _fit(start, faces, points, weights, face, held, rounds)
+    return np.where((moved == start).all(axis=1)[:, None], vertices, moved * size + center)
+
+
+def _samples(vertices: Floats, faces: Ints, wanted: int) -> tuple[Floats, Floats, Ints]:
+    """Return vertices and face centres, about `wanted` where there are more, their weights and a vertex near each.
+
+    Vertices hold the features, centres the area between: together they integrate squares over a triangle exactly.
+    """
+    areas = face_areas(vertices, faces)
+    star = np.bincount(faces.ravel(), np.repeat(areas, 3), minlength=len(vertices))
+    used = np.flatnonzero(star > 0)
+    share = min(1.0, wanted / (len(used) + len(faces)))
+    pick, middle = _evenly(len(used), share), _evenly(len(faces), share)
+    pick = used[pick]
+    corners = faces[middle]
+    centers = (vertices.take(corners[:, 0], axis=0) + vertices.take(corners[:, 1], axis=0)) / 3
+    centers += vertices.take(corners[:, 2], axis=0) / 3
+    weights = np.concatenate([star[pick] / 12, areas[middle] * 0.75])
+    return np.concatenate([vertices[pick], centers]), weights / weights.mean(), np.concatenate([pick, corners[:, 0]])
+
+
+def _evenly(count: int, share: float) -> Ints:
+    """Return a share of the indices up to `count`, at even steps."""
+    kept = max(1, int(count * share))
+    return np.arange(kept) * count // kept
+
+
+def _fit(start: Floats, faces: Ints, points: Floats, weights: Floats, face: Ints, held: Bools, rounds: int) -> Floats:
+    """Run the rounds from the samples' first faces, then take back what made the worst sample worse."""
+    neighbors = _face_neighbors(faces, len(start))
+    now = start
+    face, squared, closest = _correspond(now, faces, points, face, neighbors)
+    # a guess goes wrong over long triangles and sharp edges: samples that seem far away are looked up exactly
+    far = np.flatnonzero(squared > _FAR * np.median(squared))
+    face[far] = ClosestPoints(now, faces).query(points.take(far, axis=1).T, hint=face[far])[1]
+    worst = 0.0
+    for done in range(rounds):
+        face, squared, closest = _correspond(now, faces, points, face, neighbors)
+        worst = worst if done else float(squared.max())
+        step = _solve(now, faces, points, weights, face, _barycentric(now, faces, face, closest))
+        step[held] = 0
+        now = _without_flips(now, step, faces)
+    for _ in range(_HALVINGS):
+        face, squared, _ = _correspond(now, faces, points, face, neighbors)
+        bad = squared > worst * (1 + 1e-9)
+        if not bad.any():
+            return now
+        back = np.zeros(len(now), dtype=bool)
+        back[faces[face[bad]]] = True
+        now = _without_flips(start, np.where(back[:, None], 0.5, 1.0) * (now - start), faces)
+    return now
+
+
+def _first_faces(vertices: Floats, faces: Ints, points: Floats, survivor: Ints | None) -> Ints:
+    """Return a near face for each sample: the best around its survivor, or the closest of all where there is none."""
+    if survivor is None:
+        return ClosestPoints(vertices, faces).query(points.T)[1]
+    offsets, star = stars(faces, len(vertices))
+    counts = np.diff(offsets)
+    known = (survivor >= 0) & (counts.take(np.maximum(survivor, 0)) > 0)
+    frames = triangle_frames(vertices, faces).astype(np.float32)
+    face = np.empty(len(survivor), dtype=np.int64)
+    for start in range(0, len(face), _BLOCK):
+        rows = start + np.flatnonzero(known[start : start + _BLOCK])
+        if len(rows):
+            ends = np.cumsum(counts.take(survivor[rows]))
+            size = counts.take(survivor[rows])
+            place = np.arange(ends[-1]) + np.repeat(offsets.take(survivor[rows]) - ends + size, size)
+            candidate = star.take(place)
+            squared = squared_distances(frames.take(candidate, axis=1), points.take(np.repeat(rows, size), axis=1))
+            least = np.repeat(np.minimum.reduceat(squared, ends - size), size)
+            won = np.flatnonzero(squared == least)
+            face[np.repeat(rows, size).take(won)] = candidate.take(won)
+    rest = np.flatnonzero(~known)
+    if len(rest):
+        face[rest] = ClosestPoints(vertices, faces).query(points.take(rest, axis=1).T)[1]
+    return face
+
+
+def _correspond(
+    vertices: Floats, faces: Ints, points: Floats, face: Ints, neighbors: Ints
+) -> tuple[Ints, Floats, Floats]:
+    """Return the best of each sample's face and the faces across its sides, the squared distance and closest point.
+
+    The surface moves little between rounds: one step to a neighbour follows it at a tenth of a full search.
+    """
+    frames = triangle_frames(vertices, faces).astype(np.float32)
+    best, distance, closest = face.copy(), np.empty(len(face)), np.empty_like(points)
+    for start in range(0, len(face), _BLOCK):
+        part = slice(start, start + _BLOCK)
+        here, local = best[part], points[:, part]
+        nearest, squared, outside = closest_in_triangles(frames.take(here, axis=1), local)
+        rows = np.flatnonzero(outside)
+        candidates = neighbors.take(here.take(rows), axis=1)
+        across = squared_distances(frames.take(candidates, axis=1), local.take(rows, axis=1)[:, None])
+        choice = across.argmin(axis=0)
+        better = across.min(axis=0) < squared.take(rows)
+        rows, moved = rows[better], candidates[choice, np.arange(len(rows))][better]
+        here[rows] = moved
+        nearest[:, rows], squared[rows], _ = closest_in_triangles(frames.take(moved, axis=1), local.take(rows, axis=1))
+        closest[:, part], distance[part] = nearest, squared
+    return best, distance, closest
+
+
+def _face_neighbors(faces: Ints, vertex_count: int) -> Ints:
+    """Return (3, m): the face across each side, the face itself where there is none."""
+    begin, end = faces.T.ravel(), np.roll(faces, -1, axis=1).T.ravel()
+    keys = np.minimum(begin, end) * vertex_count + np.maximum(begin, end)
+    order = sorting_order(keys)
+    keys = keys.take(order)
+    same = keys[1:] == keys[:-1]
+    before, after = order[:-1][same], order[1:][same]
+    neighbors = np.tile(np.arange(len(faces)), 3)
+    neighbors[before], neighbors[after] = after % len(faces), before % len(faces)
+    return neighbors.reshape(3, -1)
+
+
+def _barycentric(vertices: Floats, faces: Ints, face: Ints, points: Floats) -> Floats:
+    """Return (3, k) barycentric coordinates of (3, k) points on their faces."""
+    columns = np.ascontiguousarray(vertices.T)
+    a, b, c = (columns.take(faces[:, corner], axis=1) for corner in range(3))
+    side, other = b - a, c - a
+    # coordinates are linear in the point: two covectors and an origin a face are all that a sample needs
+    aa, ab, bb = (side * side).sum(axis=0), (side * other).sum(axis=0), (other * other).sum(axis=0)
+    scale = 1 / np.maximum(aa * bb - ab * ab, 1e-300)
+    rows = np.concatenate([a, (bb * side - ab * other) * scale, (aa * other - ab * side) * scale])
+    weights = np.empty((3, len(face)))
+    for start in range(0, len(face), _BLOCK):
+        part = slice(start, start + _BLOCK)
+        local = rows.take(face[part], axis=1)
+        offset = points[:, part] - local[:3]
+        second = (offset * local[3:6]).sum(axis=0).clip(0, 1)
+        third = (offset * local[6:]).sum(axis=0).clip(0, 1 - second)
+        weights[:, part] = 1 - second - third, second, third
+    return weights
+
+
+def _solve(
+    vertices: Floats, faces: Ints, points: Floats, weights: Floats, face: Ints, places: Floats
+) -> Floats:
+    """Return the (k, 3) step that brings the points at `places` of their faces near to the samples.
+
+    The normal equations are kept as one symmetric 3 by 3 block a face.
+    """
+    count, columns = len(faces), np.ascontiguousarray(vertices.T)
+    residual = points.astype(np.float64)
+    for corner in range(3):
+        residual -= places[corner] * columns.take(faces[:, corner].take(face), axis=1)
+    heavy = weights * places
+    blocks = {(i, j): np.bincount(face, heavy[i] * places[j], minlength=count) for i in range(3) for j in range(i, 3)}
+    corners = np.ascontiguousarray(faces.T)
+    pull = np.stack([
+        _gather([np.bincount(face, heavy[i] * row, minlength=count) for i in range(3)], corners, len(vertices))
+        for row in residual
+    ])
+    # evenly spread samples would put a sixth of a face's weight on the diagonal of each of its corners
+    share = lengths(face_area_vectors(vertices, faces))
+    share *= weights.sum() / (6 * max(float(share.sum()), 1e-300))
+    damping = _DAMPING * _gather([share] * 3, corners, len(vertices)) + 1e-9
+    diagonal = damping + _gather([blocks[i, i] for i in range(3)], corners, len(vertices))
+
+    def apply(step: Floats) -> Floats:
+        out = damping * step
+        for axis in range(3):
+            x, y, z = step[axis].take(corners)
+            out[axis] += _gather(
+                [
+                    blocks[0, 0] * x + blocks[0, 1] * y + blocks[0, 2] * z,
+                    blocks[0, 1] * x + blocks[1, 1] * y + blocks[1, 2] * z,
+                    blocks[0, 2] * x + blocks[1, 2] * y + blocks[2, 2] * z,
+                ],
+                corners,
+                len(vertices),
+            )
+        return out
+
+    return _conjugate_gradients(apply, pull, diagonal).T
+
+
+def _gather(values: list[Floats], corners: Ints, count: int) -> Floats:
+    """Return the sums over the faces around each vertex of values at the faces' corners."""
+    return np.bincount(corners.ravel(), np.concatenate(values), minlength=count)
+
+
+def _conjugate_gradients(apply: Callable[[Floats], Floats], right: Floats, diagonal: Floats) -> Floats:
+    """Return about the solution of a positive definite system, three right sides at once, from zero on."""
+    answer, rest = np.zeros_like(right), right.copy()
+    scaled = rest / diagonal
+    direction = scaled.copy()
+    old = (rest * scaled).sum(axis=1, keepdims=True)
+    for _ in range(_STEPS):
+        image = apply(direction)
+        length = old / np.maximum((direction * image).sum(axis=1, keepdims=True), 1e-300)
+        answer += length * direction
+        rest -= length * image
+        scaled = rest / diagonal
+        new = (rest * scaled).sum(axis=1, keepdims=True)
+        direction = scaled + new / np.maximum(old, 1e-300) * direction
+        old = new
+    return answer
+
+
+def _without_flips(vertices: Floats, step: Floats, faces: Ints) -> Floats:
+    """Return the vertices after the step, halved and at last left out around faces that would turn or thin."""
+    before, shape = face_area_vectors(vertices, faces), _shape(vertices, faces)
+    size = lengths(before)
+    factor = np.ones(len(vertices))
+    while True:
+        moved = vertices + factor[:, None] * step
+        after = face_area_vectors(moved, faces)
+        turned = np.einsum("ij,ij->i", before, after) < _TURN * size * lengths(after)
+        bad = (turned | (_shape(moved, faces) < _SHAPE * shape)) & (factor.take(faces).max(axis=1) > 0)
+        if not bad.any():
+            return np.where(factor[:, None] > 0, moved, vertices)
+        corners = faces[bad].ravel()
+        factor[corners] = np.where(factor[corners] > 0.5**_HALVINGS, factor[corners] / 2, 0)
+
+
+def _shape(vertices: Floats, faces: Ints) -> Floats:
+    """Return the area of each face over the sum of its squared edges, zero for a point."""
+    a, b, c = (vertices.take(faces[:, corner], axis=0) for corner in range(3))
+    squares = ((b - a) ** 2).sum(axis=1) + ((c - b) ** 2).sum(axis=1) + ((a - c) ** 2).sum(axis=1)
+    return lengths(face_area_vectors(vertices, faces)) / np.maximum(squares, 1e-300)
