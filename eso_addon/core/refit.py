@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,16 +14,17 @@ from .closest import ClosestPoints, closest_in_triangles, squared_distances, tri
 from .normals import face_area_vectors, face_areas, lengths
 
 Bools = NDArray[np.bool_]
-Floats = NDArray[np.float64]
+Floats = NDArray[Any]  # float64, or float32 where only a choice hangs on it
 Ints = NDArray[np.int64]
 
 _ROUNDS = 2
 _PER_FACE = 20  # samples wanted for each simplified face
 _DAMPING = 0.5  # pull towards the present position, relative to what evenly spread samples weigh
 _STEPS = 6  # of conjugate gradients: each round starts near the answer, more change nothing
-_TURN = 0.5  # least cosine between a face's normals before and after a round
-_SHAPE = 0.5  # least area over squared edges after a round, relative to the one before
-_HALVINGS = 4
+_TURN = 0.5  # least cosine between a face's normals before and after
+_SHAPE = 0.5  # least area over squared edges afterwards, relative to before
+_HALVINGS = 3
+_SINGLE = 1e-5  # rounding of squared distances in single precision
 _FAR = 9.0  # times the median squared distance
 _BLOCK = 2048
 
@@ -63,7 +65,7 @@ def refit(
     held = boundary_vertices(faces, len(vertices))
     if fixed is not None:
         held |= fixed
-    if rounds < 1 or held.all() or not face_area_vectors(original_vertices, original_faces).any():
+    if len(faces) == 0 or rounds < 1 or held.all() or not face_area_vectors(original_vertices, original_faces).any():
         return vertices.copy()
     # unit size and the origin in the middle keep the precision of small parts of large scenes
     low, high = vertices.min(axis=0), vertices.max(axis=0)
@@ -115,16 +117,17 @@ def _fit(start: Floats, faces: Ints, points: Floats, weights: Floats, face: Ints
         worst = worst if done else float(squared.max())
         step = _solve(now, faces, points, weights, face, _barycentric(now, faces, face, closest))
         step[held] = 0
-        now = _without_flips(now, step, faces)
-    for _ in range(_HALVINGS):
+        now = _without_flips(now, step, faces, start)
+    share, step = np.ones(len(now)), now - start
+    for _ in range(2 * _HALVINGS):
         face, squared, _ = _correspond(now, faces, points, face, neighbors)
-        bad = squared > worst * (1 + 1e-9)
+        bad = squared > worst * (1 + _SINGLE)
         if not bad.any():
             return now
-        back = np.zeros(len(now), dtype=bool)
-        back[faces[face[bad]]] = True
-        now = _without_flips(start, np.where(back[:, None], 0.5, 1.0) * (now - start), faces)
-    return now
+        back = np.unique(faces[face[bad]])
+        share[back] = np.where(share[back] > 0.5**_HALVINGS, share[back] / 2, 0)
+        now = _without_flips(start, share[:, None] * step, faces, start)
+    return start
 
 
 def _first_faces(vertices: Floats, faces: Ints, points: Floats, survivor: Ints | None) -> Ints:
@@ -223,10 +226,10 @@ def _solve(
     for corner in range(3):
         residual -= places[corner] * columns.take(faces[:, corner].take(face), axis=1)
     heavy = weights * places
-    blocks = {(i, j): np.bincount(face, heavy[i] * places[j], minlength=count) for i in range(3) for j in range(i, 3)}
+    blocks = {(i, j): _sums(face, heavy[i] * places[j], count) for i in range(3) for j in range(i, 3)}
     corners = np.ascontiguousarray(faces.T)
     pull = np.stack([
-        _gather([np.bincount(face, heavy[i] * row, minlength=count) for i in range(3)], corners, len(vertices))
+        _gather([_sums(face, heavy[i] * row, count) for i in range(3)], corners, len(vertices))
         for row in residual
     ])
     # evenly spread samples would put a sixth of a face's weight on the diagonal of each of its corners
@@ -255,7 +258,12 @@ def _solve(
 
 def _gather(values: list[Floats], corners: Ints, count: int) -> Floats:
     """Return the sums over the faces around each vertex of values at the faces' corners."""
-    return np.bincount(corners.ravel(), np.concatenate(values), minlength=count)
+    return _sums(corners.ravel(), np.concatenate(values), count)
+
+
+def _sums(index: Ints, values: Floats, count: int) -> Floats:
+    """Return the sums of the values at each index."""
+    return np.bincount(index, values, minlength=count).astype(np.float64, copy=False)
 
 
 def _conjugate_gradients(apply: Callable[[Floats], Floats], right: Floats, diagonal: Floats) -> Floats:
@@ -276,9 +284,12 @@ def _conjugate_gradients(apply: Callable[[Floats], Floats], right: Floats, diago
     return answer
 
 
-def _without_flips(vertices: Floats, step: Floats, faces: Ints) -> Floats:
-    """Return the vertices after the step, halved and at last left out around faces that would turn or thin."""
-    before, shape = face_area_vectors(vertices, faces), _shape(vertices, faces)
+def _without_flips(vertices: Floats, step: Floats, faces: Ints, start: Floats) -> Floats:
+    """Return the vertices after the step, halved and at last left out around faces turned or thinned since the start.
+
+    The vertices themselves must hold no such face.
+    """
+    before, shape = face_area_vectors(start, faces), _shape(start, faces)
     size = lengths(before)
     factor = np.ones(len(vertices))
     while True:

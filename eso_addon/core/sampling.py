@@ -45,7 +45,8 @@ def edge_samples(vertices: Floats, faces: Ints, count: int, rng: np.random.Gener
     start, end = vertices.take(edges[:, 0], axis=0), vertices.take(edges[:, 1], axis=0)
     edge = _strata(lengths(end - start), count, rng)
     along = rng.random((count, 1))
-    return start.take(edge, axis=0) * (1 - along) + end.take(edge, axis=0) * along
+    first, last = start.take(edge, axis=0), end.take(edge, axis=0)
+    return first + along * (last - first)
 
 
 def _strata(sizes: Floats, count: int, rng: np.random.Generator) -> Ints:
