@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .adjacency import Ints
+from .adjacency import Bools, Ints
 
 Bits = NDArray[np.uint64]
 
@@ -48,13 +48,17 @@ class Pairs(NamedTuple):
 
 
 class _Graph(NamedTuple):
-    """One-rings as CSR with their lengths, and numbers for the keys at hand (-1 elsewhere)."""
+    """One-rings, where each begins among `neighbours` and how long it is; numbers for the keys at hand, else -1."""
 
     offsets: Ints
     neighbours: Ints
     counts: Ints
     row: Ints
     column: Ints
+
+    def between(self, block: Ints) -> Ints:
+        """Return the neighbours of consecutive vertices, one after the other."""
+        return self.neighbours[self.offsets[block[0]] : self.offsets[block[-1]] + self.counts[block[-1]]]
 
     def rows_of(self, keys: Ints) -> Ints:
         """Return the keys of the neighbours of all these keys, one after the other."""
@@ -92,10 +96,11 @@ def near_pairs(offsets: Ints, neighbours: Ints, rings: int, part: range | None =
     """
     count = len(offsets) - 1
     counts = np.diff(offsets)
-    hubs = np.flatnonzero(counts > HUB)
+    is_hub = counts > HUB
+    hubs = np.flatnonzero(is_hub)
     around_hubs = [neighbours[offsets[hub] : offsets[hub + 1]] for hub in hubs]
     if len(hubs):
-        neighbours = neighbours.compress(np.repeat(counts <= HUB, counts))
+        neighbours = neighbours.compress(np.repeat(~is_hub, counts))
         counts[hubs] = 0
         offsets = np.concatenate(([0], np.cumsum(counts)))
     unused = np.zeros(0, dtype=np.int64)
@@ -106,35 +111,33 @@ def near_pairs(offsets: Ints, neighbours: Ints, rings: int, part: range | None =
         block = np.arange(start, min(start + FRAME * FRAMES, part.stop))
         vertices, cutting = _cut_out(graph, block, rings)
         first = int(np.searchsorted(vertices, start))
-        for pairs in _block_pairs(cutting, first + block - start, np.isin(vertices, hubs), later, rings):
+        for pairs in _block_pairs(cutting, first + block - start, is_hub[vertices], later, rings):
             yield pairs._replace(vertices=np.take(vertices, pairs.vertices))
-    yield from _hub_pairs(graph, hubs, around_hubs, rings, part)
+    yield from _hub_pairs(graph, is_hub, around_hubs, rings, part)
 
 
 def _cut_out(graph: _Graph, block: Ints, rings: int) -> tuple[Ints, _Graph]:
     """Return the vertices that a block can reach, ascending, and the one-rings of all but the last ring of them."""
-    near = graph.neighbours[graph.offsets[block[0]] : graph.offsets[block[-1] + 1]]
-    levels, _ = _levels(graph, block, near, rings)
-    reached = np.concatenate(levels)
-    vertices = np.sort(reached)
+    levels, around = _levels(graph, block, graph.between(block), rings)
+    vertices = np.sort(np.concatenate(levels))
     graph.row[vertices] = np.arange(len(vertices))
-    counts = np.take(graph.counts, vertices)
-    counts[graph.row[levels[-1]]] = 0
-    inner = np.sort(np.concatenate(levels[:-1]))
-    neighbours = np.take(graph.row, graph.rows_of(inner))
+    inner = np.concatenate(levels[:-1])
+    own, lengths = np.take(graph.row, inner), np.take(graph.counts, inner)
+    offsets, counts = np.zeros((2, len(vertices)), dtype=np.int64)
+    offsets[own], counts[own] = np.cumsum(lengths) - lengths, lengths
+    neighbours = np.take(graph.row, np.concatenate(around))
     graph.row[vertices] = -1
-    offsets = np.concatenate(([0], np.cumsum(counts)))
     return vertices, _Graph(offsets, neighbours, counts, *np.full((2, FRAMES * len(vertices)), -1))
 
 
-def _block_pairs(graph: _Graph, block: Ints, is_hub: NDArray[np.bool_], later: Bits, rings: int) -> Iterator[Pairs]:
+def _block_pairs(graph: _Graph, block: Ints, is_hub: Bools, later: Bits, rings: int) -> Iterator[Pairs]:
     """Find the pairs of each frame's vertices with each other and with vertices of higher number."""
     count = len(graph.counts)
     start = int(block[0])
     frames = (block - start) // FRAME
-    near = graph.neighbours[graph.offsets[start] : graph.offsets[block[-1] + 1]]
     shifts = frames * count
-    levels, around = _levels(graph, block + shifts, near + np.repeat(shifts, graph.counts[block]), rings)
+    near = graph.between(block) + np.repeat(shifts, graph.counts[block])
+    levels, around = _levels(graph, block + shifts, near, rings)
     columns = _columns(count, start, levels, is_hub)
     width = max(FRAME, MOST_WORDS // sum(map(len, levels)) * 64)
     for first in range(0, columns.width, width):
@@ -156,15 +159,15 @@ def _block_pairs(graph: _Graph, block: Ints, is_hub: NDArray[np.bool_], later: B
             yield Pairs(columns.vertices, places, counts[owners], others)
 
 
-def _hub_pairs(graph: _Graph, hubs: Ints, around: list[Ints], rings: int, part: range) -> Iterator[Pairs]:
+def _hub_pairs(graph: _Graph, is_hub: Bools, around: list[Ints], rings: int, part: range) -> Iterator[Pairs]:
     """Find the pairs that have a hub in them, hub by hub: there are few, and each has many."""
-    is_hub = np.zeros(len(graph.counts), dtype=bool)
-    is_hub[hubs] = True
-    for hub, ring in zip(hubs, around):
+    for hub, ring in zip(np.flatnonzero(is_hub), around):
+        if hub not in part:
+            continue
         near = np.concatenate(_levels(graph, np.array([hub]), ring, rings)[0])
         graph.row[near] = -1
         vertices = near.compress(~is_hub[near] | (near >= hub))  # the hub itself is the first of them
-        if len(vertices) > 1 and hub in part:
+        if len(vertices) > 1:
             yield Pairs(vertices, np.array([0]), np.array([len(vertices) - 1]), np.arange(1, len(vertices)))
 
 
@@ -191,7 +194,7 @@ def _levels(graph: _Graph, block: Ints, near: Ints, rings: int) -> tuple[list[In
     return levels, around
 
 
-def _columns(count: int, start: int, levels: list[Ints], is_hub: NDArray[np.bool_]) -> _Columns:
+def _columns(count: int, start: int, levels: list[Ints], is_hub: Bools) -> _Columns:
     """Give each frame's vertices, and those of higher number around it, a column of the frame's rows; hubs none."""
     block = levels[0]
     halo = np.sort(np.concatenate(levels[1:]))

@@ -52,9 +52,7 @@ def grid(side: int, rng: np.random.Generator, bump: float = 0.3) -> tuple[Floats
     ids = np.arange(side * side).reshape(side, side)
     a, b, c, d = ids[:-1, :-1].ravel(), ids[:-1, 1:].ravel(), ids[1:, 1:].ravel(), ids[1:, :-1].ravel()
     turned = rng.random(len(a)) < 0.4
-    faces = np.concatenate(
-        (np.stack((a, b, np.where(turned, d, c)), 1), np.stack((np.where(turned, b, a), c, d), 1))
-    )
+    faces = np.concatenate((np.stack((a, b, np.where(turned, d, c)), 1), np.stack((np.where(turned, b, a), c, d), 1)))
     place = rng.permutation(side * side)
     shuffled = np.empty_like(vertices)
     shuffled[place] = vertices
@@ -89,7 +87,7 @@ def test_equals_the_search_on_any_soup(seed: int, count: int, face_count: int, r
 
 @pytest.mark.parametrize("rings", [1, 2, 3])
 def test_sets_may_come_in_parts(monkeypatch: pytest.MonkeyPatch, rings: int) -> None:
-    monkeypatch.setattr(ring_pairs, "BLOCK", 64)
+    monkeypatch.setattr(ring_pairs, "FRAME", 64)
     monkeypatch.setattr(ring_pairs, "MOST_WORDS", 1)
     monkeypatch.setattr(ring_pairs, "LONG_ROW", 5)
     rng = np.random.default_rng(5)
