@@ -8,7 +8,8 @@ from pathlib import Path
 import bpy
 
 from eso_addon import SimplifyResult, lod_chain, measure
-from eso_addon.bridge.scene_files import SceneFile, quiet
+from eso_addon.bridge.quiet import quiet
+from eso_addon.bridge.scene_files import SceneFile
 from eso_addon.settings.profiles import PROFILES
 
 from .meshes import Mesh, decimate, sample_mesh

@@ -257,8 +257,11 @@ def _open(source: Path, target: Path) -> Model:
 
 
 def _scene_files() -> Any:  # noqa: ANN401 - a module
+    from .bridge.quiet import quiet
+
     try:
-        import bpy  # noqa: F401 - only whether it is there
+        with quiet("cannot start Blender"):
+            import bpy  # noqa: F401 - only whether it is there
     except ImportError as error:
         raise ValueError(f"only .off files work without Blender's module: pip install bpy ({error})") from None
     from .bridge import scene_files

@@ -77,6 +77,7 @@ def test_the_module_keeps_its_output_clean(ball: Path, tmp_path: Path) -> None:
     command = [sys.executable, "-m", "eso_addon", *map(str, words)]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.count("\n") == 2, done.stdout
     assert [line.split()[0] for line in done.stdout.splitlines()] == ["ball:", str(tmp_path / "small.glb")]
 
 
