@@ -209,7 +209,7 @@ def _simplify(args: argparse.Namespace) -> None:
 
     def run(part: "Part", goals: Sequence[float]) -> "list[SimplifyResult]":
         _, vertices, faces = part
-        return [simplify(vertices, faces, **{keyword: goals[0]}, **options)]
+        return [simplify(vertices, faces, **{**options, keyword: goals[0]})]
 
     model = _open(args.input, args.output)
     started = time.perf_counter()
@@ -231,7 +231,7 @@ def _lod(args: argparse.Namespace) -> None:
 
     def run(part: "Part", goals: Sequence[float]) -> "list[SimplifyResult]":
         _, vertices, faces = part
-        return lod_chain(vertices, faces, **{keyword: goals}, **options)
+        return lod_chain(vertices, faces, **{**options, keyword: goals})
 
     model = _open(args.input, args.output)
     started = time.perf_counter()
