@@ -18,8 +18,8 @@ Floats = NDArray[Any]  # float64, or float32 where only a choice hangs on it
 Ints = NDArray[np.int64]
 
 _ROUNDS = 2
-_PER_FACE = 20  # samples wanted for each simplified face
-_DAMPING = 0.5  # pull towards the present position, relative to what evenly spread samples weigh
+_PER_FACE = 16  # samples wanted for each simplified face
+_DAMPING = 1.0  # pull towards the present position, relative to what evenly spread samples weigh
 _STEPS = 6  # of conjugate gradients: each round starts near the answer, more change nothing
 _TURN = 0.5  # least cosine between a face's normals before and after
 _SHAPE = 0.5  # least area over squared edges afterwards, relative to before
