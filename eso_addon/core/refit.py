@@ -214,9 +214,7 @@ def _barycentric(vertices: Floats, faces: Ints, face: Ints, points: Floats) -> F
     return weights
 
 
-def _solve(
-    vertices: Floats, faces: Ints, points: Floats, weights: Floats, face: Ints, places: Floats
-) -> Floats:
+def _solve(vertices: Floats, faces: Ints, points: Floats, weights: Floats, face: Ints, places: Floats) -> Floats:
     """Return the (k, 3) step that brings the points at `places` of their faces near to the samples.
 
     The normal equations are kept as one symmetric 3 by 3 block a face.
@@ -228,10 +226,9 @@ def _solve(
     heavy = weights * places
     blocks = {(i, j): _sums(face, heavy[i] * places[j], count) for i in range(3) for j in range(i, 3)}
     corners = np.ascontiguousarray(faces.T)
-    pull = np.stack([
-        _gather([_sums(face, heavy[i] * row, count) for i in range(3)], corners, len(vertices))
-        for row in residual
-    ])
+    pull = np.stack(
+        [_gather([_sums(face, heavy[i] * row, count) for i in range(3)], corners, len(vertices)) for row in residual]
+    )
     # evenly spread samples would put a sixth of a face's weight on the diagonal of each of its corners
     share = lengths(face_area_vectors(vertices, faces))
     share *= weights.sum() / (6 * max(float(share.sum()), 1e-300))
