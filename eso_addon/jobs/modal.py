@@ -52,6 +52,7 @@ class EngineOperator:
         self._timer = manager.event_timer_add(_POLL_SECONDS, window=context.window)
         manager.progress_begin(0, 100)
         manager.modal_handler_add(self)
+        self._show_progress(context)
         return {"RUNNING_MODAL"}
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
@@ -96,7 +97,7 @@ class EngineOperator:
     def _show_progress(self, context: bpy.types.Context) -> None:
         percent = min(max(round(self._worker.progress * 100), 0), 100)
         context.window_manager.progress_update(percent)
-        state = "stopping" if self._worker.is_stopped else f"{percent} %"
+        state = "stopping" if self._worker.is_stopped else f"{percent} %" if percent else "working"
         context.workspace.status_text_set(f"{self.bl_label}: {state}   |   Esc: cancel")  # type: ignore[attr-defined]
 
     def _clean_up(self, context: bpy.types.Context) -> None:

@@ -11,6 +11,7 @@ from ..jobs.modal import EngineOperator
 from ..jobs.worker import Steps
 from ..settings.options import LodOptions
 from .polls import poll_with, why_not_simplify
+from .probing import with_errors
 from .reports import notes_of, tell
 
 
@@ -40,7 +41,7 @@ class OBJECT_OT_eso_lod_generate(EngineOperator, LodOptions, bpy.types.Operator)
         targets, options = self.lod_targets(), self.engine_options()
         self._object = context.active_object
         self._source = read_mesh(self._object, apply_modifiers=self.apply_modifiers)
-        return lod_chain_steps(self._source.vertices, self._source.triangles, **targets, **options)
+        return with_errors(lod_chain_steps(self._source.vertices, self._source.triangles, **targets, **options))
 
     def finish(self, context: bpy.types.Context, result: list[SimplifyResult]) -> None:
         """Write the levels as objects, the finest first."""

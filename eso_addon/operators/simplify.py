@@ -12,6 +12,7 @@ from ..jobs.modal import EngineOperator
 from ..jobs.worker import Steps
 from ..settings.options import SimplifyOptions
 from .polls import poll_with, why_not_simplify
+from .probing import with_errors
 from .reports import notes_of, tell, triangles
 
 
@@ -47,7 +48,7 @@ class OBJECT_OT_eso_simplify(EngineOperator, SimplifyOptions, bpy.types.Operator
             raise MeshError(reason)
         self._source = read_mesh(self._object, apply_modifiers=self.apply_modifiers)
         target, options = self.simplify_target(), self.engine_options()
-        return simplify_steps(self._source.vertices, self._source.triangles, **target, **options)
+        return with_errors(simplify_steps(self._source.vertices, self._source.triangles, **target, **options))
 
     def finish(self, context: bpy.types.Context, result: SimplifyResult) -> None:
         """Write the result beside the source, or in its place."""

@@ -27,7 +27,7 @@ _PLACEMENTS = (
 )
 _PRESETS = (
     ("default", "Default", "The best that was measured"),
-    ("paper", "Paper", "Equations 8 and 9 as printed, for comparison; sets the options below itself"),
+    ("paper", "Paper", "Equations 8 and 9 as printed, for comparison"),
 )
 
 
@@ -67,32 +67,27 @@ class EngineOptions:
     )
 
     def draw_engine(self, layout: bpy.types.UILayout) -> None:
-        """Draw the options; what the preset decides is greyed."""
+        """Draw the options; what has no effect is greyed."""
         layout.prop(self, "preset")
-        column = layout.column()
-        column.active = self.preset == "default"
-        column.prop(self, "method")
-        row = column.row()
+        layout.prop(self, "method")
+        row = layout.row()
         row.active = self.method == "eso"
         row.prop(self, "rings")
-        column.prop(self, "placement")
-        column.prop(self, "prune")
-        column.prop(self, "refit")
+        layout.prop(self, "placement")
+        layout.prop(self, "prune")
+        row = layout.row()
+        row.active = self.preset == "default" and self.placement == "optimal"
+        row.prop(self, "refit")
         layout.prop(self, "weld")
         layout.prop(self, "apply_modifiers")
 
     def engine_options(self) -> dict[str, Any]:
         """Give the options as `simplify` and `lod_chain` take them."""
-        if self.preset == "paper":
-            return {"preset": "paper", "weld": self.weld}
-        return {
-            "method": self.method,
-            "rings": self.rings,
-            "placement": self.placement,
-            "weld": self.weld,
-            "prune": self.prune,
-            "refit": self.refit,
-        }
+        names = ("preset", "method", "rings", "placement", "weld", "prune")
+        options = {name: getattr(self, name) for name in names}
+        if self.preset == "default":  # the paper does not refit
+            options["refit"] = self.refit
+        return options
 
 
 class SimplifyOptions(EngineOptions):

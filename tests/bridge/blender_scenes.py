@@ -2,6 +2,7 @@
 """Small scenes for the tests of everything that touches Blender."""
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import bpy
 import numpy as np
@@ -48,6 +49,16 @@ def add_mesh(name: str, vertices: list, faces: list, edges: list = ()) -> bpy.ty
     bpy.context.scene.collection.objects.link(obj)
     activate(obj)
     return obj
+
+
+def linked_from_library(folder: Path, kind: str, name: str) -> bpy.types.ID:
+    """Save this file as a library, start an empty one, and link one thing of the library into it."""
+    path = str(folder / "library.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    with bpy.data.libraries.load(path, link=True) as (_, ours):
+        setattr(ours, kind, [name])
+    return getattr(bpy.data, kind)[name]
 
 
 def activate(*objects: bpy.types.Object) -> None:

@@ -6,7 +6,7 @@ import pytest
 
 from eso_addon.bridge import objects
 from eso_addon.core.mesh import MeshError
-from tests.bridge.blender_scenes import add_cube, add_sphere
+from tests.bridge.blender_scenes import add_cube, add_sphere, linked_from_library
 
 
 def new_mesh() -> bpy.types.Mesh:
@@ -63,14 +63,9 @@ def test_in_place_for_all_users() -> None:
 @pytest.mark.parametrize("local_object", [True, False])
 def test_linked_data_is_not_replaced(tmp_path: Path, local_object: bool) -> None:
     add_cube("Far")
-    path = str(tmp_path / "library.blend")
-    bpy.ops.wm.save_as_mainfile(filepath=path)
-    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
-    with bpy.data.libraries.load(path, link=True) as (_, ours):
-        ours.objects, ours.meshes = ["Far"], ["Far"]
-    obj = bpy.data.objects["Far"]
+    obj = linked_from_library(tmp_path, "objects", "Far")
     if local_object:
-        obj = bpy.data.objects.new("Near", bpy.data.meshes["Far"])
+        obj = bpy.data.objects.new("Near", obj.data)
     mesh = new_mesh()
     with pytest.raises(MeshError, match="make it local first"):
         objects.replace_mesh(obj, mesh, modifiers_applied=True)
@@ -79,13 +74,9 @@ def test_linked_data_is_not_replaced(tmp_path: Path, local_object: bool) -> None
 def test_the_result_of_a_library_override_is_local(tmp_path: Path) -> None:
     collection = objects.level_collection("Far", bpy.context.scene)
     collection.objects.link(add_cube())
-    path = str(tmp_path / "library.blend")
-    bpy.ops.wm.save_as_mainfile(filepath=path)
-    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
-    with bpy.data.libraries.load(path, link=True) as (_, ours):
-        ours.collections = ["Far"]
+    linked = linked_from_library(tmp_path, "collections", "Far")
     scene = bpy.context.scene
-    bpy.data.collections["Far"].override_hierarchy_create(scene, bpy.context.view_layer, do_fully_editable=True)
+    linked.override_hierarchy_create(scene, bpy.context.view_layer, do_fully_editable=True)
     source = next(obj for obj in bpy.data.objects if obj.override_library is not None)
     mesh = new_mesh()
     new = objects.add_object(source, mesh, "New", [scene.collection], modifiers_applied=True, properties={})
@@ -129,12 +120,7 @@ def test_only_levels_of_the_same_source_are_removed() -> None:
 def test_a_linked_collection_takes_no_new_objects(tmp_path: Path) -> None:
     collection = objects.level_collection("Far", bpy.context.scene)
     collection.objects.link(add_cube())
-    path = str(tmp_path / "library.blend")
-    bpy.ops.wm.save_as_mainfile(filepath=path)
-    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
-    with bpy.data.libraries.load(path, link=True) as (_, ours):
-        ours.collections = ["Far"]
-    linked = bpy.data.collections["Far"]
+    linked = linked_from_library(tmp_path, "collections", "Far")
     scene = bpy.context.scene
     scene.collection.children.link(linked)
     assert objects.collections_for(linked.objects[0], scene) == [scene.collection]

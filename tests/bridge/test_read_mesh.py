@@ -8,7 +8,7 @@ from mathutils import Matrix
 
 from eso_addon.bridge.read_mesh import read_mesh, scale_transform
 from eso_addon.core.mesh import MeshError
-from tests.bridge.blender_scenes import activate, add_cube, add_mesh, add_sphere, arrays
+from tests.bridge.blender_scenes import activate, add_cube, add_mesh, add_sphere, arrays, linked_from_library
 
 
 def test_positions_and_triangles_are_blenders_own() -> None:
@@ -118,12 +118,7 @@ def test_a_disabled_object_with_modifiers_is_refused() -> None:
 
 def test_linked_data_is_read(tmp_path: Path) -> None:
     add_sphere("Far")
-    path = str(tmp_path / "library.blend")
-    bpy.ops.wm.save_as_mainfile(filepath=path)
-    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
-    with bpy.data.libraries.load(path, link=True) as (_, ours):
-        ours.objects = ["Far"]
-    obj = bpy.data.objects["Far"]
+    obj = linked_from_library(tmp_path, "objects", "Far")
     assert obj.library is not None
     bpy.context.scene.collection.objects.link(obj)
     assert len(read_mesh(obj).triangles) == len(obj.data.polygons)

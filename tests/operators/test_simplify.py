@@ -8,7 +8,7 @@ import pytest
 
 from eso_addon.bridge.read_mesh import read_mesh
 from eso_addon.core.simplify import simplify
-from tests.bridge.blender_scenes import activate, add_cube, add_mesh, add_sphere, arrays
+from tests.bridge.blender_scenes import activate, add_cube, add_mesh, add_sphere, arrays, linked_from_library
 
 pytestmark = pytest.mark.usefixtures("addon")
 simplify_active = bpy.ops.object.eso_simplify
@@ -157,12 +157,7 @@ def test_a_hidden_or_locked_object_works(hide: str) -> None:
 
 def link_ball(tmp_path: Path) -> bpy.types.Object:
     add_sphere("Far")
-    path = str(tmp_path / "library.blend")
-    bpy.ops.wm.save_as_mainfile(filepath=path)
-    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
-    with bpy.data.libraries.load(path, link=True) as (_, ours):
-        ours.objects = ["Far"]
-    obj = bpy.data.objects["Far"]
+    obj = linked_from_library(tmp_path, "objects", "Far")
     bpy.context.scene.collection.objects.link(obj)
     activate(obj)
     return obj

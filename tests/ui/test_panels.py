@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Panels draw into a stand-in for Blender's layout; how they look is seen in a window."""
 
+from pathlib import Path
 from types import SimpleNamespace
 
 import bpy
@@ -8,7 +9,7 @@ import pytest
 
 from eso_addon import operators, settings, ui
 from eso_addon.ui import menus, panels
-from tests.bridge.blender_scenes import add_cube, add_sphere
+from tests.bridge.blender_scenes import activate, add_cube, add_sphere, linked_from_library
 
 
 class Layout:
@@ -94,6 +95,17 @@ def test_what_cannot_run_is_greyed_with_the_reason() -> None:
     assert buttons(panels.VIEW3D_PT_eso_simplify) == {"object.eso_simplify": True}
     assert buttons(panels.VIEW3D_PT_eso_levels) == {"object.eso_lod_generate": True}
     assert "Select the original" in labels(panels.VIEW3D_PT_eso_measure)
+
+
+def test_in_place_is_greyed_with_the_reason_for_linked_data(tmp_path: Path) -> None:
+    add_cube("Far")
+    obj = linked_from_library(tmp_path, "objects", "Far")
+    bpy.context.scene.collection.objects.link(obj)
+    activate(obj)
+    assert buttons(panels.VIEW3D_PT_eso_simplify) == {"object.eso_simplify": True}
+    bpy.context.scene.eso_lod.in_place = True
+    assert buttons(panels.VIEW3D_PT_eso_simplify) == {"object.eso_simplify": False}
+    assert "make it local" in labels(panels.VIEW3D_PT_eso_simplify)
 
 
 def test_the_last_run_is_shown() -> None:
