@@ -34,6 +34,9 @@ _GATHER = pow(_SCATTER, -1, 1 << 32)
 # faces a block: its arrays stay in the second cache
 _BLOCK = 16384
 _SAMPLES = 8192
+# with fewer faces than this the share shrinks with them, to this part: small meshes are collapsed with more care
+_LARGE = 50_000
+_CAREFUL = 0.2
 
 
 @dataclass(frozen=True)
@@ -52,15 +55,18 @@ class Rules:
         The link condition: no collapse changes the topology.
     share : float
         The part of the edges, the cheapest, from which a batch is chosen.
+    spread : float
+        These edges cost at most so many times what the cheapest eighth of them does.
     curvature_factor : bool
         Multiply costs by Equation 5, renewed where collapses change it.
     """
 
     endpoint: bool = False
-    memory: float = 1e-7
+    memory: float = 1e-9
     flip: float = 0.2
     guard: bool = True
     share: float = 0.4
+    spread: float = 3.0
     curvature_factor: bool = False
 
 
@@ -82,7 +88,10 @@ class _State:
 
     def __post_init__(self) -> None:
         count = self.nowhere
-        self.before = self.points.astype(np.float32)
+        sides = self.points.take(self.faces[0], axis=0) - self.points.take(self.faces[1], axis=0)
+        # normals are compared in single precision: in units of an edge their squares neither vanish nor overflow
+        self.unit = 1.0 / max(float(np.sqrt((sides * sides).sum(axis=1)).mean()), 1e-300)
+        self.before = (self.points * self.unit).astype(np.float32)
         self.after = self.before.copy()  # as the batch would have it
         self.open = bool(self.boundary.any())
         self.best = np.full(count + 1, _NONE)
@@ -232,15 +241,9 @@ def _apply_factor(state: _State) -> None:
 
 def _choose(state: _State) -> _Batch | None:
     """Choose the edges that are the cheapest at both ends, among the cheapest part of all."""
-    costs = state.costs.ravel()
-    sample = costs[:: max(len(costs) // _SAMPLES, 1)]
-    sample = sample[np.isfinite(sample)]
-    if len(sample) < 64:
-        sample = costs[np.isfinite(costs)]
-        if len(sample) == 0:
-            return None
-    rank = int(state.rules.share * (len(sample) - 1))
-    threshold = np.partition(sample, rank)[rank]
+    threshold = _threshold(state)
+    if threshold is None:
+        return None
     one, other, keys = _candidates(state, threshold)
     np.minimum.at(state.best, one, keys)
     np.minimum.at(state.best, other, keys)
@@ -250,6 +253,22 @@ def _choose(state: _State) -> _Batch | None:
     keys = np.sort(keys.take(best))
     slot = ((keys & _LOW) * _GATHER) & _LOW
     return _place(state, slot, (keys >> 32).astype(np.int32).view(np.float32))
+
+
+def _threshold(state: _State) -> np.float32 | None:
+    """Return the cost up to which edges may go now: of the cheapest part, and not far above the very cheapest."""
+    costs = state.costs.ravel()
+    sample = costs[:: max(len(costs) // _SAMPLES, 1)]
+    sample = sample[np.isfinite(sample)]
+    if len(sample) < 64:
+        sample = costs[np.isfinite(costs)]
+        if len(sample) == 0:
+            return None
+    last = len(sample) - 1
+    share = state.rules.share * min(max(state.alive / _LARGE, _CAREFUL), 1.0)
+    cheapest, cheap = int(share / 8 * last), int(share * last)
+    sample = np.partition(sample, (cheapest, cheap))
+    return min(sample[cheap], state.rules.spread * sample[cheapest])
 
 
 def _candidates(state: _State, threshold: np.float32) -> tuple[Ints, Ints, Ints]:
@@ -322,7 +341,7 @@ def _test(state: _State, batch: _Batch) -> None:
     count = len(batch.one)
     state.label[batch.one] = state.label[batch.other] = np.arange(count)
     state.survivor[batch.other] = batch.one
-    state.after[batch.one] = state.after[batch.other] = batch.places.astype(np.float32)
+    state.after[batch.one] = state.after[batch.other] = (batch.places * state.unit).astype(np.float32)
 
     def test(part: slice) -> tuple[_Touched, Ints, Ints, tuple[Ints, Ints, Ints]]:
         touched = _touched(state, part)
@@ -447,7 +466,7 @@ def _collapse(state: _State, batch: _Batch, target: int) -> tuple | None:
     kept, gone, places = batch.one.take(chosen), batch.other.take(chosen), batch.places.take(chosen, axis=0)
     state.quadrics[kept] = batch.quadrics.take(chosen, axis=0)
     state.points[kept] = places
-    state.before[kept] = places
+    state.before[kept] = state.after[kept]
     state.boundary[kept] |= state.boundary[gone]
     _update(state, batch)
     state.base.ravel()[batch.slot[batch.bad]] = np.inf
@@ -465,7 +484,7 @@ def _collapse(state: _State, batch: _Batch, target: int) -> tuple | None:
 
 def _update(state: _State, batch: _Batch) -> None:
     """Replace the corners that went, drop the faces that fell, and weigh the sides whose vertices changed."""
-    nowhere = state.nowhere
+    nowhere, width, base = state.nowhere, state.faces.shape[1], state.base.ravel()
     falling = np.append(~batch.bad, False)  # no remover clips to the last,
     done = np.append(False, ~batch.bad)  # and no collapse to the first
 
@@ -477,16 +496,20 @@ def _update(state: _State, batch: _Batch) -> None:
         face = touched.face.take(staying)
         corner = [state.survivor.take(row.take(staying)) for row in touched.corner]
         changed = [done.take(row.take(staying) + 1, mode="clip") for row in touched.label]
+        places, starts, ends = [], [], []
         for side in range(3):
-            faces, base = state.faces[side], state.base[side]
-            faces[fallen] = nowhere
-            base[fallen] = np.inf
-            faces[face] = corner[side]
+            state.faces[side][fallen] = nowhere
+            state.faces[side][face] = corner[side]
             stale = np.flatnonzero(changed[side] | changed[(side + 1) % 3])
-            place, start, end = face.take(stale), corner[side].take(stale), corner[(side + 1) % 3].take(stale)
+            start, end = corner[side].take(stale), corner[(side + 1) % 3].take(stale)
+            place = face.take(stale) + side * width
+            base[fallen + side * width] = np.inf
             base[place] = np.inf
             weighed = np.flatnonzero(_counts(state, start, end))
-            base[place.take(weighed)] = _edge_costs(state, start.take(weighed), end.take(weighed))
+            places.append(place.take(weighed))
+            starts.append(start.take(weighed))
+            ends.append(end.take(weighed))
+        base[np.concatenate(places)] = _edge_costs(state, np.concatenate(starts), np.concatenate(ends))
 
     state.blocks.map(update, len(batch.touched), 1)
 

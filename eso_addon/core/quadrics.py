@@ -36,10 +36,11 @@ def plane_quadrics(points: Floats, faces: Ints, *, area_weighted: bool) -> Float
     """
     normals, areas = area_normals(points, faces)
     scale = np.where(areas > 0, (areas if area_weighted else 1.0) / np.maximum(areas * areas, 1e-300), 0.0)
-    corners = faces.ravel()
     parts = np.empty((6, points.shape[1]))
     for part, (i, j) in zip(parts, _PAIRS, strict=True):
-        part[:] = np.bincount(corners, np.tile(normals[i] * normals[j] * scale, 3), points.shape[1])
+        product = normals[i] * normals[j]
+        product *= scale
+        part[:] = sum(np.bincount(corner, product, points.shape[1]) for corner in faces)
     return parts
 
 
@@ -98,23 +99,20 @@ def anchored(parts: Floats, points: Floats, memory: float) -> Floats:
     -------
     ndarray, (n, 12) float64
     """
-    quadrics = np.zeros((points.shape[1], WIDTH))
-    trace = parts[0] + parts[3] + parts[5]
-    for column in range(6):
-        quadrics[:, column] = parts[column]
-    for column in _DIAGONAL:
-        quadrics[:, column] += memory * trace + _TINY
-    _set_linear(quadrics, points)
+    quadrics = np.empty((points.shape[1], WIDTH))
+    columns = np.zeros((WIDTH, _BLOCK))
+    for start in range(0, len(quadrics), _BLOCK):
+        block = parts[:, start : start + _BLOCK]
+        x, y, z = points[:, start : start + _BLOCK]
+        q = columns[:, : block.shape[1]]
+        q[:6] = block
+        q[_DIAGONAL, :] += memory * (block[0] + block[3] + block[5]) + _TINY
+        q[6] = -(q[0] * x + q[1] * y + q[2] * z)
+        q[7] = -(q[1] * x + q[3] * y + q[4] * z)
+        q[8] = -(q[2] * x + q[4] * y + q[5] * z)
+        q[9] = -(q[6] * x + q[7] * y + q[8] * z)
+        quadrics[start : start + _BLOCK] = q.T
     return quadrics
-
-
-def _set_linear(quadrics: Floats, points: Floats) -> None:
-    a11, a12, a13, a22, a23, a33 = quadrics.T[:6]
-    x, y, z = points
-    quadrics[:, 6] = -(a11 * x + a12 * y + a13 * z)
-    quadrics[:, 7] = -(a12 * x + a22 * y + a23 * z)
-    quadrics[:, 8] = -(a13 * x + a23 * y + a33 * z)
-    quadrics[:, 9] = -(quadrics[:, 6] * x + quadrics[:, 7] * y + quadrics[:, 8] * z)
 
 
 def move_memory(merged: Floats, one: Floats, other: Floats, starts: Floats, ends: Floats, places: Floats,

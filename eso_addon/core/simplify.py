@@ -50,7 +50,7 @@ class Options:
         Weigh planes by their faces' areas; without it by one, as printed.
     boundary_weight : float
         Weight of the quadrics that hold open boundaries.
-    memory, flip, share, guard
+    memory, flip, share, spread, guard
         See `collapse.Rules`.
     weld : bool
         Treat vertices at equal positions as one, and hand them back split.
@@ -68,9 +68,10 @@ class Options:
     weight_power: float = 0.5
     area_weighted: bool = True
     boundary_weight: float = 1.0
-    memory: float = 1e-7
+    memory: float = 1e-9
     flip: float = 0.2
     share: float = 0.4
+    spread: float = 3.0
     guard: bool = True
     weld: bool = True
     prune: float = 0.0
@@ -219,7 +220,7 @@ def lod_chain_steps(vertices: ArrayLike, faces: ArrayLike, ratios: Sequence[floa
         quadrics = _quadrics(mesh, chosen, blocks)
         yield 0.1
         rules = Rules(chosen.placement == "endpoint", chosen.memory, chosen.flip, chosen.guard, chosen.share,
-                      chosen.method == "cf")
+                      chosen.spread, chosen.method == "cf")
         least = min(counts) if counts else 0
         run = collapse_steps(mesh.points, mesh.faces, quadrics, mesh.opened, None, least, rules, blocks)
         total = max(mesh.faces.shape[1] - least, 1)
