@@ -22,6 +22,7 @@ class EngineOperator:
     _timer: Any
     _start: float
     _stop_time: float
+    _shown: str = ""
 
     def prepare(self, context: bpy.types.Context) -> Steps[Any]:
         """Read Blender's data and return the engine's generator, which touches arrays only."""
@@ -52,6 +53,7 @@ class EngineOperator:
         self._timer = manager.event_timer_add(_POLL_SECONDS, window=context.window)
         manager.progress_begin(0, 100)
         manager.modal_handler_add(self)
+        self._shown = ""
         self._show_progress(context)
         return {"RUNNING_MODAL"}
 
@@ -96,9 +98,12 @@ class EngineOperator:
 
     def _show_progress(self, context: bpy.types.Context) -> None:
         percent = min(max(round(self._worker.progress * 100), 0), 100)
-        context.window_manager.progress_update(percent)
         state = "stopping" if self._worker.is_stopped else f"{percent} %" if percent else "working"
-        context.workspace.status_text_set(f"{self.bl_label}: {state}   |   Esc: cancel")  # type: ignore[attr-defined]
+        text = f"{self.bl_label}: {state}   |   Esc: cancel"  # type: ignore[attr-defined]
+        if text != self._shown:  # each change costs a redraw, which the engine waits for
+            self._shown = text
+            context.window_manager.progress_update(percent)
+            context.workspace.status_text_set(text)
 
     def _clean_up(self, context: bpy.types.Context) -> None:
         manager = context.window_manager
