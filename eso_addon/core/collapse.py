@@ -297,7 +297,7 @@ def _ends(faces: Ints, slots: Ints) -> tuple[Ints, Ints]:
 
 
 def _place(state: _State, slot: Ints, cost: np.ndarray) -> _Batch:
-    """Find where the vertex of each chosen edge is to stand, and which of the two goes."""
+    """Find where the vertex of each chosen edge is to stand and which of the two goes, and label both."""
     one, other = _ends(state.faces, slot)
     count = len(slot)
     batch = _Batch(one, other, slot, cost, np.empty((count, WIDTH)), np.zeros((count, 4)), np.zeros(count, bool),
@@ -317,6 +317,10 @@ def _place(state: _State, slot: Ints, cost: np.ndarray) -> _Batch:
             places = np.where(stays, places, optimal_places(summed)) if stays.any() else optimal_places(summed)
         move_memory(summed, first, second, starts, ends, places, state.rules.memory)
         batch.quadrics[part], batch.places[part, :3], batch.stays[part] = summed, places.T, stays
+        one, other = batch.one[part], batch.other[part]
+        state.label[one] = state.label[other] = np.arange(part.start, part.stop)
+        state.survivor[other] = one
+        state.after[one] = state.after[other] = batch.places[part] * state.unit
 
     state.blocks.map(place, count, _BLOCK // 4)
     return batch
@@ -339,10 +343,6 @@ def _stays(state: _State, one: Ints, other: Ints) -> tuple[Bools, Bools]:
 def _test(state: _State, batch: _Batch) -> None:
     """Mark the collapses that would turn a face over or change the topology."""
     count = len(batch.one)
-    state.label[batch.one] = state.label[batch.other] = np.arange(count)
-    state.survivor[batch.other] = batch.one
-    state.after[batch.one] = state.after[batch.other] = (batch.places * state.unit).astype(np.float32)
-
     def test(part: slice) -> tuple[_Touched, Ints, Ints, tuple[Ints, Ints, Ints]]:
         touched = _touched(state, part)
         falling = touched.gone.take(np.flatnonzero(touched.gone != _NONE))
@@ -464,10 +464,15 @@ def _collapse(state: _State, batch: _Batch, target: int) -> tuple | None:
         _reject(state, batch, late)
     chosen = np.flatnonzero(~batch.bad)
     kept, gone, places = batch.one.take(chosen), batch.other.take(chosen), batch.places.take(chosen, axis=0)
-    state.quadrics[kept] = batch.quadrics.take(chosen, axis=0)
-    state.points[kept] = places
-    state.before[kept] = state.after[kept]
-    state.boundary[kept] |= state.boundary[gone]
+
+    def carry_out(part: slice) -> None:
+        vertices = kept[part]
+        state.quadrics[vertices] = batch.quadrics.take(chosen[part], axis=0)
+        state.points[vertices] = places[part]
+        state.before[vertices] = state.after.take(vertices, axis=0)
+        state.boundary[vertices] |= state.boundary.take(gone[part])
+
+    state.blocks.map(carry_out, len(chosen), _BLOCK // 4)
     _update(state, batch)
     state.base.ravel()[batch.slot[batch.bad]] = np.inf
     state.label[kept], state.label[gone] = ~kept, ~gone

@@ -26,13 +26,12 @@ def open_vertices(faces: Ints, count: int) -> Bools:
     mixed = np.arange(1, count + 1, dtype=np.uint64) * np.uint64(0x9E3779B97F4A7C15)
     mixed = (mixed ^ (mixed >> np.uint64(29))) * np.uint64(0xBF58476D1CE4E5B9)
     hashed = (mixed >> np.uint64(24)).astype(np.float64)
-    corners = faces.ravel()
-    values = hashed.take(corners)
-    width = faces.shape[1]
-    following = np.concatenate((values[width:], values[:width]))
-    preceding = np.concatenate((values[2 * width :], values[: 2 * width]))
+    values = [hashed.take(row) for row in faces]
     # whole numbers below 2 to the 53rd add up exactly; beyond that a vertex may be named in vain
-    return np.bincount(corners, following, count) != np.bincount(corners, preceding, count)
+    balance = np.zeros(count)
+    for corner in range(3):
+        balance += np.bincount(faces[corner], values[(corner + 1) % 3] - values[(corner + 2) % 3], count)
+    return balance != 0
 
 
 def boundary_sides(faces: Ints, opened: Bools) -> Ints:

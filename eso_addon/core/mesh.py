@@ -115,8 +115,42 @@ def morton_order(points: Floats) -> Ints:
     order : ndarray, (n,) int64
         The points' indices along the curve; equal codes keep the order of their indices.
     """
+    return _morton_sorted(points)[0]
+
+
+def morton_weld(points: Floats) -> tuple[Ints, Bools]:
+    """Order points along a Morton curve, equal positions together.
+
+    Parameters
+    ----------
+    points : ndarray, (n, 3) float64
+
+    Returns
+    -------
+    order : ndarray, (n,) int64
+    new : ndarray, (n,) bool
+        Along the order, where another position than the one before begins.
+    """
+    order, codes = _morton_sorted(points)
+    new = np.ones(len(order), bool)
+    tied = np.flatnonzero(codes[1:] == codes[:-1])
+    if len(tied) == 0:
+        return order, new
+    equal = (points.take(order.take(tied + 1), axis=0) == points.take(order.take(tied), axis=0)).all(axis=1)
+    if not equal.all():  # equal positions may have others of their cell between them
+        cell = np.zeros(len(order), bool)
+        cell[tied] = cell[tied + 1] = True
+        places = np.flatnonzero(cell)
+        x, y, z = points.take(order.take(places), axis=0).T
+        order[places] = order.take(places).take(np.lexsort((order.take(places), z, y, x, codes.take(places))))
+        equal = (points.take(order.take(tied + 1), axis=0) == points.take(order.take(tied), axis=0)).all(axis=1)
+    new[tied.compress(equal) + 1] = False
+    return order, new
+
+
+def _morton_sorted(points: Floats) -> tuple[Ints, Ints]:
     if len(points) == 0:
-        return np.zeros(0, np.int64)
+        return np.zeros(0, np.int64), np.zeros(0, np.int64)
     index_bits = max(len(points) - 1, 1).bit_length()
     axis_bits = min((63 - index_bits) // 3, 16)
     low = points.min(axis=0)
@@ -126,7 +160,10 @@ def morton_order(points: Floats) -> Ints:
     for axis in range(3):
         cell = ((points[:, axis] - low[axis]) * scale).astype(np.int64)
         keys |= _spread(cell) << axis
-    return np.sort((keys << index_bits) | np.arange(len(points))) & ((1 << index_bits) - 1)
+    keys <<= index_bits
+    keys |= np.arange(len(points))
+    keys.sort()
+    return keys & ((1 << index_bits) - 1), keys >> index_bits
 
 
 def _spread(values: Ints) -> Ints:

@@ -7,7 +7,7 @@ import numpy as np
 
 from .adjacency import vertex_components
 from .manifold import open_vertices, orient, winding_conflicts
-from .mesh import Bools, Floats, Ints, MeshError, morton_order, weld
+from .mesh import Bools, Floats, Ints, MeshError, morton_order, morton_weld
 
 
 @dataclass(frozen=True)
@@ -73,27 +73,19 @@ def prepare(vertices: Floats, faces: Ints, *, join: bool = True, prune: float = 
     messages = []
     if len(faces) == 0:
         raise MeshError("the mesh has no faces: there is nothing to simplify")
-    representative = weld(vertices) if join else np.arange(len(vertices))
-    joined = representative.take(faces)
-    kept = np.flatnonzero(_distinct(joined))
+    vertex, source = _numbers(vertices, faces, join)
+    corners = vertex.take(faces.T)
+    kept = _distinct(corners)
     if len(kept) < len(faces):
         messages.append(f"{len(faces) - len(kept)} faces without area or repeated were dropped")
-        joined = joined.take(kept, axis=0)
+        corners = corners.take(kept, axis=1)
     if prune > 0 and len(kept):
-        large = _large_parts(vertices, joined, prune)
-        if not large.all():
-            messages.append(f"{len(large) - int(large.sum())} faces of parts smaller than {prune:g} were dropped")
-            kept, joined = kept[large], joined[large]
+        large = np.flatnonzero(_large_parts(vertices.take(source, axis=0), corners.T, prune))
+        if len(large) < len(kept):
+            messages.append(f"{len(kept) - len(large)} faces of parts smaller than {prune:g} were dropped")
+            kept, corners = kept.take(large), corners.take(large, axis=1)
     if len(kept) == 0:
         raise MeshError("no face with three distinct corners is left: there is nothing to simplify")
-    split = _sheets(faces, len(vertices), representative, kept)
-    used = np.zeros(len(vertices), bool)
-    used[joined] = True
-    source = np.flatnonzero(used)
-    source = source.take(morton_order(vertices.take(source, axis=0)))
-    number = np.full(len(vertices), -1)
-    number[source] = np.arange(len(source))
-    corners = number.take(joined.T)
     lowest = np.minimum(np.minimum(corners[0], corners[1]), corners[2])
     order = np.sort((lowest << 32) | np.arange(len(kept))) & 0xFFFFFFFF
     corners, kept = corners.take(order, axis=1), kept.take(order)
@@ -111,26 +103,46 @@ def prepare(vertices: Floats, faces: Ints, *, join: bool = True, prune: float = 
         raise MeshError("coordinates are too large: scale the mesh down first")
     size = extent * float(np.linalg.norm((high - low) / extent))
     points = np.ascontiguousarray(((placed - center) / size).T)
-    vertex = number.take(representative)
+    joined = len(source) < np.count_nonzero(vertex >= 0)
+    split = vertex_components(faces.take(kept, axis=0), len(vertices)) if joined else None
     return Prepared(points, corners, opened, center, size, source, vertex, split, kept, turned, tuple(messages))
 
 
-def _distinct(faces: Ints) -> Bools:
-    """Tell the faces with three different corners that do not repeat an earlier face the same way round."""
-    a, b, c = faces.T
+def _numbers(vertices: Floats, faces: Ints, join: bool) -> tuple[Ints, Ints]:
+    """Number the positions that faces use along a Morton curve: of each vertex, -1 if unused, and a vertex of each."""
+    used = np.zeros(len(vertices), bool)
+    used[faces] = True
+    some = None if used.all() else np.flatnonzero(used)
+    points = vertices if some is None else vertices.take(some, axis=0)
+    if join:
+        order, new = morton_weld(points)
+    else:
+        order = morton_order(points)
+        new = np.ones(len(order), bool)
+    order = order if some is None else some.take(order)
+    vertex = np.full(len(vertices), -1)
+    vertex[order] = np.cumsum(new) - 1
+    return vertex, order if new.all() else order.compress(new)
+
+
+def _distinct(faces: Ints) -> Ints:
+    """Return the faces, of (3, m), with three different corners that do not repeat an earlier one the same way round."""
+    a, b, c = faces
     proper = (a != b) & (b != c) & (c != a)
-    low = np.minimum(np.minimum(a, b), c)
-    following = np.where(low == a, b, np.where(low == b, c, a))
-    preceding = np.where(low == a, c, np.where(low == b, a, b))
-    count = int(faces.max(initial=0)) + 1
-    # faces whose first side is no other's cannot be repeated: few are left to compare whole
-    keys = np.sort(low * count + following)
-    if (keys[1:] == keys[:-1]).any():
+    # of faces with the same corners the sums are the same: few others are left to compare whole
+    mixed = np.arange(1, int(faces.max(initial=0)) + 2, dtype=np.uint64) * np.uint64(0x9E3779B97F4A7C15)
+    mixed = (mixed ^ (mixed >> np.uint64(29))) * np.uint64(0xBF58476D1CE4E5B9)
+    sums = mixed.take(a) + mixed.take(b) + mixed.take(c)
+    ranked = np.sort(sums)
+    if (ranked[1:] == ranked[:-1]).any():
+        low = np.minimum(np.minimum(a, b), c)
+        following = np.where(low == a, b, np.where(low == b, c, a))
+        preceding = np.where(low == a, c, np.where(low == b, a, b))
         _, first = np.unique(np.stack((low, following, preceding), axis=1), axis=0, return_index=True)
-        repeated = np.ones(len(faces), bool)
+        repeated = np.ones(len(a), bool)
         repeated[first] = False
         proper &= ~repeated
-    return proper
+    return np.flatnonzero(proper)
 
 
 def _large_parts(vertices: Floats, faces: Ints, least: float) -> Bools:
@@ -145,10 +157,3 @@ def _large_parts(vertices: Floats, faces: Ints, least: float) -> Bools:
         np.maximum.at(high, part, values.max(axis=1))
         square += (high - low) ** 2
     return (square >= least * least).take(part)
-
-
-def _sheets(faces: Ints, count: int, representative: Ints, kept: Ints) -> Ints | None:
-    """Return the connected part of each vertex before the weld, where the weld joined vertices of different parts."""
-    if np.array_equal(representative, np.arange(count)):
-        return None
-    return vertex_components(faces.take(kept, axis=0), count)
