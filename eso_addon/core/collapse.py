@@ -63,7 +63,7 @@ class Rules:
 
     endpoint: bool = False
     memory: float = 1e-9
-    flip: float = 0.2
+    flip: float = 0.5
     guard: bool = True
     share: float = 0.4
     spread: float = 3.0
@@ -435,14 +435,19 @@ def _repeated(keys: Ints) -> Ints:
     return keys[1:][keys[1:] == keys[:-1]]
 
 
+def _withdraw(state: _State, batch: _Batch, out: Bools) -> None:
+    """Take collapses out of the batch, as if they had not been chosen."""
+    batch.bad |= out
+    for end in (batch.one[out], batch.other[out]):
+        state.after[end] = state.before[end]
+        state.label[end] = ~end
+        state.survivor[end] = end
+
+
 def _reject(state: _State, batch: _Batch, rejected: Bools) -> None:
     """Take collapses out of the batch, and test their faces again without them, until no more turn over."""
     while rejected.any():
-        batch.bad |= rejected
-        for end in (batch.one[rejected], batch.other[rejected]):
-            state.after[end] = state.before[end]
-            state.label[end] = ~end
-            state.survivor[end] = end
+        _withdraw(state, batch, rejected)
         outcast = np.append(False, rejected)
         rejected = np.zeros(len(batch.bad), bool)
         for touched in batch.touched:
@@ -459,9 +464,8 @@ def _collapse(state: _State, batch: _Batch, target: int) -> tuple | None:
     removed = np.cumsum(falling)
     late = np.zeros(len(removed), bool)
     late[np.searchsorted(removed, state.alive - target) + 1 :] = True
-    late &= ~batch.bad
-    if late.any():
-        _reject(state, batch, late)
+    failed = batch.slot[batch.bad]
+    _withdraw(state, batch, late & ~batch.bad)
     chosen = np.flatnonzero(~batch.bad)
     kept, gone, places = batch.one.take(chosen), batch.other.take(chosen), batch.places.take(chosen, axis=0)
 
@@ -474,7 +478,7 @@ def _collapse(state: _State, batch: _Batch, target: int) -> tuple | None:
 
     state.blocks.map(carry_out, len(chosen), _BLOCK // 4)
     _update(state, batch)
-    state.base.ravel()[batch.slot[batch.bad]] = np.inf
+    state.base.ravel()[failed] = np.inf
     state.label[kept], state.label[gone] = ~kept, ~gone
     if len(chosen) == 0:
         return None

@@ -4,23 +4,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .adjacency import boundary_vertices, sorting_order, stars
 from .closest import ClosestPoints, closest_in_triangles, squared_distances, triangle_frames
-from .normals import face_area_vectors, face_areas, lengths
+from .normals import face_area_vectors, face_areas, face_normals, lengths
 
 Bools = NDArray[np.bool_]
 Floats = NDArray[Any]  # float64, or float32 where only a choice hangs on it
 Ints = NDArray[np.int64]
 
 _ROUNDS = 2
-_PER_FACE = 16  # samples wanted for each simplified face
-_DAMPING = 1.0  # pull towards the present position, relative to what evenly spread samples weigh
-_STEPS = 6  # of conjugate gradients: each round starts near the answer, more change nothing
+_PER_FACE = 10  # samples wanted for each simplified face
+_DAMPING = 0.3  # pull towards the present position, relative to what evenly spread samples weigh
+_TILT = 0.03  # weight of a tilt against the original's normal, times an edge, beside that of a distance
+_AGREE = 0.5  # least cosine between a sample's normal and its face's for the tilt to count
+_STEPS = 4  # of conjugate gradients: each round starts near the answer, more change nothing
 _TURN = 0.5  # least cosine between a face's normals before and after
 _SHAPE = 0.5  # least area over squared edges afterwards, relative to before
 _HALVINGS = 3
@@ -70,17 +72,30 @@ def refit(
     # unit size and the origin in the middle keep the precision of small parts of large scenes
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     center, size = (low + high) / 2, float((high - low).max()) or 1.0
-    samples, weights, corner = _samples(original_vertices, original_faces, _PER_FACE * len(faces))
+    samples, weights, corner, normals = _samples(original_vertices, original_faces, _PER_FACE * len(faces))
     # single precision decides which face is near: it takes half the time, and positions are solved in double
-    points = np.ascontiguousarray(((samples - center) / size).T, dtype=np.float32)
+    exact = np.ascontiguousarray(((samples - center) / size).T)
+    points = exact.astype(np.float32)
     start = (vertices - center) / size
     face = _first_faces(start, faces, points, None if vertex_map is None else vertex_map.take(corner))
-    moved = _fit(start, faces, points, weights, face, held, rounds)
+    moved = _fit(start, faces, _Samples(exact, points, weights, normals), face, held, rounds)
     return np.where((moved == start).all(axis=1)[:, None], vertices, moved * size + center)
 
 
-def _samples(vertices: Floats, faces: Ints, wanted: int) -> tuple[Floats, Floats, Ints]:
-    """Return vertices and face centres, about `wanted` where there are more, their weights and a vertex near each.
+class _Samples(NamedTuple):
+    """Samples of the original: (3, k) points in double and single precision, (k,) weights, (3, k) normals.
+
+    The normals of vertices are zero: at a sharp edge they are no face's.
+    """
+
+    exact: Floats
+    points: Floats
+    weights: Floats
+    normals: Floats
+
+
+def _samples(vertices: Floats, faces: Ints, wanted: int) -> tuple[Floats, Floats, Ints, Floats]:
+    """Return vertices and face centres, about `wanted` where there are more, weights, a vertex near each, and normals.
 
     Vertices hold the features, centres the area between: together they integrate squares over a triangle exactly.
     """
@@ -94,7 +109,9 @@ def _samples(vertices: Floats, faces: Ints, wanted: int) -> tuple[Floats, Floats
     centers = (vertices.take(corners[:, 0], axis=0) + vertices.take(corners[:, 1], axis=0)) / 3
     centers += vertices.take(corners[:, 2], axis=0) / 3
     weights = np.concatenate([star[pick] / 12, areas[middle] * 0.75])
-    return np.concatenate([vertices[pick], centers]), weights / weights.mean(), np.concatenate([pick, corners[:, 0]])
+    normals = np.concatenate([np.zeros((len(pick), 3)), face_normals(vertices, corners)])
+    points = np.concatenate([vertices[pick], centers])
+    return points, weights / weights.mean(), np.concatenate([pick, corners[:, 0]]), np.ascontiguousarray(normals.T)
 
 
 def _evenly(count: int, share: float) -> Ints:
@@ -103,8 +120,9 @@ def _evenly(count: int, share: float) -> Ints:
     return np.arange(kept) * count // kept
 
 
-def _fit(start: Floats, faces: Ints, points: Floats, weights: Floats, face: Ints, held: Bools, rounds: int) -> Floats:
+def _fit(start: Floats, faces: Ints, samples: _Samples, face: Ints, held: Bools, rounds: int) -> Floats:
     """Run the rounds from the samples' first faces, then take back what made the worst sample worse."""
+    points = samples.points
     neighbors = _face_neighbors(faces, len(start))
     now = start
     face, squared, closest = _correspond(now, faces, points, face, neighbors)
@@ -115,7 +133,7 @@ def _fit(start: Floats, faces: Ints, points: Floats, weights: Floats, face: Ints
     for done in range(rounds):
         face, squared, closest = _correspond(now, faces, points, face, neighbors)
         worst = worst if done else float(squared.max())
-        step = _solve(now, faces, points, weights, face, _barycentric(now, faces, face, closest))
+        step = _solve(now, faces, samples, face, _barycentric(now, faces, face, closest))
         step[held] = 0
         now = _without_flips(now, step, faces, start)
     share, step = np.ones(len(now)), now - start
@@ -214,13 +232,14 @@ def _barycentric(vertices: Floats, faces: Ints, face: Ints, points: Floats) -> F
     return weights
 
 
-def _solve(vertices: Floats, faces: Ints, points: Floats, weights: Floats, face: Ints, places: Floats) -> Floats:
-    """Return the (k, 3) step that brings the points at `places` of their faces near to the samples.
+def _solve(vertices: Floats, faces: Ints, samples: _Samples, face: Ints, places: Floats) -> Floats:
+    """Return the (k, 3) step that brings the points at `places` of their faces near to the samples, level with them.
 
-    The normal equations are kept as one symmetric 3 by 3 block a face.
+    The normal equations are kept as one symmetric 3 by 3 block a face for the distances, and one for the tilts.
     """
     count, columns = len(faces), np.ascontiguousarray(vertices.T)
-    residual = points.astype(np.float64)
+    weights = samples.weights
+    residual = samples.exact.copy()
     for corner in range(3):
         residual -= places[corner] * columns.take(faces[:, corner].take(face), axis=1)
     heavy = weights * places
@@ -234,9 +253,12 @@ def _solve(vertices: Floats, faces: Ints, points: Floats, weights: Floats, face:
     share *= weights.sum() / (6 * max(float(share.sum()), 1e-300))
     damping = _DAMPING * _gather([share] * 3, corners, len(vertices)) + 1e-9
     diagonal = damping + _gather([blocks[i, i] for i in range(3)], corners, len(vertices))
+    tilts = _tilts(vertices, faces, samples, face)
+    pull -= _tilt(tilts, columns, corners)
+    diagonal = diagonal + np.stack([_gather([2 * tilts[axis, axis]] * 3, corners, len(vertices)) for axis in range(3)])
 
     def apply(step: Floats) -> Floats:
-        out = damping * step
+        out = damping * step + _tilt(tilts, step, corners)
         for axis in range(3):
             x, y, z = step[axis].take(corners)
             out[axis] += _gather(
@@ -251,6 +273,30 @@ def _solve(vertices: Floats, faces: Ints, points: Floats, weights: Floats, face:
         return out
 
     return _conjugate_gradients(apply, pull, diagonal).T
+
+
+def _tilts(vertices: Floats, faces: Ints, samples: _Samples, face: Ints) -> Floats:
+    """Return the (3, 3, m) sums of the outer products of the normals of each face's samples, where they agree with it."""
+    normals = samples.normals
+    own = np.ascontiguousarray(face_normals(vertices, faces).T)
+    weights = np.where((own.take(face, axis=1) * normals).sum(axis=0) > _AGREE, _TILT * samples.weights, 0)
+    sums = np.empty((3, 3, len(faces)))
+    for i in range(3):
+        for j in range(i, 3):
+            sums[i, j] = sums[j, i] = _sums(face, weights * normals[i] * normals[j], len(faces))
+    return sums
+
+
+def _tilt(tilts: Floats, columns: Floats, corners: Ints) -> Floats:
+    """Return the gradient, (3, k), of how far the faces' edges rise along the samples' normals, squared and halved."""
+    ends = [columns.take(corner, axis=1) for corner in corners]
+    rises = [np.einsum("ijf,jf->if", tilts, ends[(corner + 1) % 3] - ends[corner]) for corner in range(3)]
+    return np.stack(
+        [
+            _gather([rises[corner - 1][axis] - rises[corner][axis] for corner in range(3)], corners, columns.shape[1])
+            for axis in range(3)
+        ]
+    )
 
 
 def _gather(values: list[Floats], corners: Ints, count: int) -> Floats:

@@ -26,10 +26,10 @@ from .variation import METHODS, surface_variation
 Int32s = NDArray[np.int32]
 Value = TypeVar("Value")
 
-# samples for `SimplifyResult.error`
-_PROBES = 4096
-# a maximum error is sought on samples: others, denser, may find a little more
+_PROBES = 8192
+# a maximum error is sought with probes until this part of it is used; more of them may find a little more
 _MARGIN = 0.9
+_ENOUGH = 0.75
 
 
 @dataclass(frozen=True)
@@ -67,9 +67,9 @@ class Options:
     placement: str = "optimal"
     weight_power: float = 0.5
     area_weighted: bool = True
-    boundary_weight: float = 1.0
+    boundary_weight: float = 10.0
     memory: float = 1e-9
-    flip: float = 0.2
+    flip: float = 0.5
     share: float = 0.4
     spread: float = 3.0
     guard: bool = True
@@ -92,7 +92,8 @@ class Options:
 # the equations as printed: planes of weight one, weights once and to the first power, nothing held, edges only
 PRESETS: dict[str, dict[str, Any]] = {
     "default": {},
-    "paper": {"weight_power": 1.0, "area_weighted": False, "boundary_weight": 0.0, "memory": 1e-9, "share": 0.05,
+    "paper": {"weight_power": 1.0, "area_weighted": False, "boundary_weight": 0.0, "memory": 1e-9, "flip": 0.2,
+              "share": 0.05,
               "guard": False, "refit": False},
 }
 
@@ -128,12 +129,8 @@ class SimplifyResult:
 
     @cached_property
     def error(self) -> float:
-        """Largest distance from probes of the original (its vertices, at most a few thousand) to this surface."""
-        vertices, faces = self.original
-        used = np.unique(faces)
-        probes = vertices[used[:: max(len(used) // _PROBES, 1)]]
-        _, _, squared = ClosestPoints(self.vertices, self.faces.astype(np.int64)).query(probes)
-        return float(np.sqrt(squared.max(initial=0.0)))
+        """Largest distance between both surfaces at some thousands of probes, in the mesh's units; `measure` takes more."""
+        return _Probes(self.original).deviation(self)
 
 
 def simplify(vertices: ArrayLike, faces: ArrayLike, *, ratio: float | None = None, faces_target: int | None = None,
@@ -300,7 +297,7 @@ def _quadrics(mesh: Prepared, options: Options, blocks: Blocks) -> Floats:
                                    edges, options.boundary_weight)
     if options.method in ("so", "eso"):
         rings = 1 if options.method == "so" else int(options.rings)
-        weights = surface_variation(mesh.points.T, mesh.faces.T, rings)
+        weights = surface_variation(mesh.points.T, mesh.faces.T, rings, blocks)
         mean = weights.mean()
         if mean > 0:
             parts *= np.maximum(weights / mean, 1e-6) ** options.weight_power
@@ -362,25 +359,48 @@ def _judge_count(result: SimplifyResult, target: int) -> SimplifyResult:
 
 def _within(mesh: Prepared, record: CollapseRecord, original: tuple[Floats, Ints], limit: float,
             options: Options) -> SimplifyResult:
-    """Find the longest prefix of the record whose measured deviation stays within a limit."""
+    """Find a long prefix of the record whose measured deviation stays within a limit.
+
+    The costs are no distances, so the deviation is measured: with probes while the prefix is sought, and at the end as
+    `measure` does it.
+    """
     plain = replace(options, refit=False)
-
-    def deviation(result: SimplifyResult) -> float:
-        return measure(*original, result.vertices, result.faces).symmetric.maximum
-
+    probes = _Probes(original)
     low, high = 0, len(record)
-    best = _level(mesh, record, original, 0, plain)
     while low < high:
         middle = (low + high + 1) // 2
-        result = _level(mesh, record, original, middle, plain)
-        if deviation(result) <= _MARGIN * limit:
-            low, best = middle, result
-        else:
+        deviation = probes.deviation(_level(mesh, record, original, middle, plain))
+        if deviation > _MARGIN * limit:
             high = middle - 1
-        if high - low <= max(len(result.faces) // 200, 0):
+            continue
+        low = middle
+        if deviation > _ENOUGH * limit:
             break
-    if options.refit and options.placement == "optimal" and low:
-        fitted = _level(mesh, record, original, low, options)
-        if deviation(fitted) <= _MARGIN * limit:
-            best = fitted
-    return best
+    while low:
+        for chosen in (options, plain) if options.refit else (plain,):
+            result = _level(mesh, record, original, low, chosen)
+            if measure(*original, result.vertices, result.faces).symmetric.maximum <= limit:
+                return result
+        low = max(low - (mesh.faces.shape[1] - low) // 20 - 1, 0)
+    return _level(mesh, record, original, 0, plain)
+
+
+class _Probes:
+    """Points spread over an original, to bound the deviation of many levels quickly."""
+
+    def __init__(self, original: tuple[Floats, Ints]) -> None:
+        vertices, faces = original
+        self.surface = ClosestPoints(vertices, faces)
+        self.points = _thin(np.concatenate((vertices[np.unique(faces)], vertices[faces].mean(axis=1))))
+
+    def deviation(self, level: SimplifyResult) -> float:
+        corners = level.vertices[level.faces]
+        middles = (corners + np.roll(corners, 1, axis=1)).reshape(-1, 3) / 2
+        points = _thin(np.concatenate((level.vertices, corners.mean(axis=1), middles)))
+        _, _, forward = ClosestPoints(level.vertices, level.faces.astype(np.int64)).query(self.points)
+        _, _, backward = self.surface.query(points)
+        return float(np.sqrt(max(forward.max(initial=0.0), backward.max(initial=0.0))))
+
+
+def _thin(points: Floats) -> Floats:
+    return points[:: -(-len(points) // _PROBES) or 1]
