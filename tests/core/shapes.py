@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Generator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 
 from eso_addon.core.adjacency import components, corner_fans, unique_edges, vertex_components
 
+Bools = NDArray[np.bool_]
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Mesh = tuple[Floats, Ints]
@@ -130,7 +132,8 @@ def finned(mesh: Mesh, faces_of: int = 1) -> Mesh:
     vertices, faces = mesh
     fins = faces[:faces_of].copy()
     fins[:, 2] = len(vertices) + np.arange(faces_of)
-    return np.concatenate((vertices, vertices[faces[:faces_of]].mean(axis=1) * 1.5 + 0.3)), np.concatenate((faces, fins))
+    tips = vertices[faces[:faces_of]].mean(axis=1) * 1.5 + 0.3
+    return np.concatenate((vertices, tips)), np.concatenate((faces, fins))
 
 
 def noisy(mesh: Mesh, rng: np.random.Generator, amount: float) -> Mesh:
@@ -215,10 +218,11 @@ def anything(seed: int) -> Mesh:
     return np.round(vertices * 2) / 2, faces
 
 
-def drained(steps: Generator[Any, None, Any]) -> tuple[list[Any], Any]:
-    """Return what a generator yields, and what it returns."""
-    yielded = []
+def drained(steps: Generator[Any, None, Any], most: int = 100_000) -> tuple[list[Any], Any]:
+    """Return what a generator yields, and what it returns; it must not go on without end."""
+    yielded: list[Any] = []
     while True:
+        assert len(yielded) <= most, "it goes on without end"
         try:
             yielded.append(next(steps))
         except StopIteration as end:
@@ -240,7 +244,7 @@ def euler(faces: Ints, piece: Ints) -> Counter[int]:
 
 
 def topology(faces: Ints) -> Counter[tuple[int, int]]:
-    """Return of each piece, taken apart at pinched vertices, the Euler characteristic and the number of boundary loops."""
+    """Return Euler characteristic and number of boundary loops of each piece, pinched vertices taken apart."""
     apart = corner_fans(faces, int(faces.max(initial=-1)) + 1)
     count = int(apart.max(initial=-1)) + 1
     piece = vertex_components(apart, count)
@@ -249,3 +253,17 @@ def topology(faces: Ints) -> Counter[tuple[int, int]]:
     heads = np.unique(components(count, rims[:, 0], rims[:, 1])[rims[:, 0]], return_index=True)[1]
     loops = Counter(piece[rims[heads, 0]].tolist())
     return Counter((value, loops[number]) for number, value in euler(apart, piece).items())
+
+
+def read_obj(path: Path) -> Mesh:
+    """Return vertices and triangles of a plain .obj file."""
+    vertices: list[list[float]] = []
+    faces: list[list[int]] = []
+    for words in (line.split() for line in path.read_text().splitlines()):
+        if words[:1] == ["v"]:
+            vertices.append([float(word) for word in words[1:4]])
+        elif words[:1] == ["f"]:
+            numbers = [int(word.split("/")[0]) for word in words[1:]]
+            corners = [number - 1 if number > 0 else len(vertices) + number for number in numbers]
+            faces += [[corners[0], corners[i], corners[i + 1]] for i in range(1, len(corners) - 1)]
+    return np.array(vertices), np.array(faces)

@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 
+from eso_addon.core.adjacency import vertex_components
 from eso_addon.core.manifold import boundary_sides, open_vertices, orient, winding_conflicts
 
 from . import shapes
@@ -66,7 +67,7 @@ def test_faces_wound_against_the_others_are_found(seed: int, share: float) -> No
     rng = np.random.default_rng(seed)
     turned = rng.random(len(faces)) < share
     found = orient(np.where(turned[:, None], faces[:, ::-1], faces).T, len(vertices))
-    part = shapes.vertex_components(faces, len(vertices))[faces[:, 0]]
+    part = vertex_components(faces, len(vertices))[faces[:, 0]]
     for number in np.unique(part):
         here, there = turned[part == number], found[part == number]
         assert there.sum() * 2 <= len(there)

@@ -7,6 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
+from eso_addon.core.adjacency import unique_edges
 from eso_addon.core.manifold import boundary_sides, open_vertices
 from eso_addon.core.quadrics import (
     anchored,
@@ -106,7 +107,7 @@ def test_error_is_the_quadratic_form(seed: int) -> None:
 def test_optimal_place_is_where_the_gradient_vanishes(seed: int, memory: float) -> None:
     vertices, faces = shapes.manifold(seed)
     rows = engine_quadrics(vertices, faces, area_weighted=True, boundary=1.0, memory=memory)
-    edges, _ = shapes.unique_edges(faces, len(vertices))
+    edges, _ = unique_edges(faces, len(vertices))
     summed = rows[edges[:, 0]] + rows[edges[:, 1]]
     places = optimal_places(summed)
     quadric = matrices(summed)
@@ -149,7 +150,7 @@ def test_memory_moves_with_the_vertex(seed: int, memory: float) -> None:
     vertices, faces = shapes.manifold(seed)
     plain = engine_quadrics(vertices, faces, area_weighted=True, boundary=1.0, memory=0.0)
     held = engine_quadrics(vertices, faces, area_weighted=True, boundary=1.0, memory=memory)
-    edges, _ = shapes.unique_edges(faces, len(vertices))
+    edges, _ = unique_edges(faces, len(vertices))
     one, other = edges.T
     places = rng.normal(size=(3, len(edges)))
     merged = held[one] + held[other]

@@ -30,7 +30,8 @@ def random_record(seed: int) -> tuple[CollapseRecord, Floats, Ints]:
     number = len(removed)
     record = CollapseRecord(
         np.array(removed, np.int64), np.array(kept, np.int64), rng.normal(size=(number, 3)),
-        np.array(left, np.int64), np.zeros(number, np.float32), np.zeros(1, np.int64), len(faces), np.zeros(number, bool))
+        np.array(left, np.int64), np.zeros(number, np.float32), np.zeros(1, np.int64), len(faces),
+        np.zeros(number, bool))
     return record, rng.normal(size=(count, 3)), faces
 
 
