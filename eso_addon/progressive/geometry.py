@@ -1,0 +1,202 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Where a new vertex is expected, in whole numbers alone, so that every reader computes the same."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..core.mesh import Floats, Ints
+from .coder import CLASSES, Reader, Writer, code_numbers, size_class
+from .fans import Fans
+from .models import Model
+from .splits import Arcs
+
+# the grid of predictions: coordinates below 2 to this
+GRID_BITS = 25
+# scores and normals use coordinates of so many bits, so that products stay exact in double precision
+_SHORT_BITS = 17
+
+
+@dataclass(frozen=True)
+class Grid:
+    """How coordinates are told apart: as multiples of a step, or as floats in their order.
+
+    Attributes
+    ----------
+    kind : int
+        0: coordinate = float32(number * scale), 1: coordinate = float32(number / scale), both with `origin` added to
+        the product in double precision; 2: the number is the float's place among all floats.
+    scale : float
+    origin : tuple of float
+    shift : int
+        Prediction coordinates lose so many bits for scores.
+    """
+
+    kind: int
+    scale: float
+    origin: tuple[float, float, float]
+    shift: int
+
+    def floats(self, numbers: Ints) -> np.ndarray:
+        """Return the coordinates of (n, 3) numbers, float32."""
+        if self.kind == 2:
+            return float_at(numbers)
+        scaled = numbers * self.scale if self.kind == 0 else numbers / self.scale
+        with np.errstate(over="ignore"):
+            return (scaled + np.array(self.origin)).astype(np.float32)
+
+    def predictors(self, numbers: Ints) -> Ints:
+        """Return the coordinates on the grid of predictions, (n, 3) int64."""
+        if self.kind != 2:
+            return numbers
+        values = float_at(numbers).astype(np.float64)
+        values[~np.isfinite(values)] = 0.0
+        return np.rint(values * self.scale).astype(np.int64)
+
+
+def place_of(values: np.ndarray) -> Ints:
+    """Return the place of float32 numbers in their order, as int64: all bit patterns are told apart."""
+    bits = np.ascontiguousarray(values, np.float32).view(np.int32).astype(np.int64)
+    return np.where(bits >= 0, bits, -1 - (bits & 0x7FFFFFFF))
+
+
+def float_at(places: Ints) -> np.ndarray:
+    """Return the float32 numbers at places in their order."""
+    bits = np.where(places >= 0, places, (-1 - places) | 0x80000000)
+    return (bits & 0xFFFFFFFF).astype(np.uint32).view(np.float32)
+
+
+class Shape:
+    """Adaptive models of positions."""
+
+    def __init__(self) -> None:
+        self.models = [Model(CLASSES, CLASSES, shared=True) for _ in range(3)]
+
+
+def ring_sums(points: Ints, fans: Fans, arcs: Arcs, vertex: Ints) -> tuple[Ints, Ints]:
+    """Return for each split the sum over its new vertex's ring, (3, k), and the ring's size, (k,)."""
+    count = len(vertex)
+    ring = fans.preceding.take(arcs.corner)
+    size = np.bincount(arcs.split, minlength=count) + 2
+    total = points.take(vertex, axis=0).T + points.take(arcs.first_ring, axis=0).T
+    for axis in range(3):
+        total[axis] += np.bincount(arcs.split, points[:, axis].take(ring), count).astype(np.int64)
+    return total, size
+
+
+def arc_normals(points: Ints, fans: Fans, arcs: Arcs, vertex: Ints, shift: int) -> Ints:
+    """Return the sum of the normals of each split's arc, scaled to below 2 to the 12th: (3, k) int64."""
+    center = points.take(vertex, axis=0).take(arcs.split, axis=0)
+    p = ((points.take(fans.following.take(arcs.corner), axis=0) - center) >> shift).T
+    q = ((points.take(fans.preceding.take(arcs.corner), axis=0) - center) >> shift).T
+    normal = np.empty((3, len(vertex)), np.int64)
+    for axis in range(3):
+        j, k = (axis + 1) % 3, (axis + 2) % 3
+        part = p[j] * q[k] - p[k] * q[j]
+        normal[axis] = np.bincount(arcs.split, part, len(vertex))
+    length = np.abs(normal).max(axis=0, initial=0)
+    excess = np.maximum(np.frexp(length.astype(np.float64))[1].astype(np.int64) - 12, 0)
+    return normal >> excess
+
+
+def code_positions(coder: Writer | Reader, shape: Shape, grid: Grid, points: Ints, fans: Fans, arcs: Arcs,
+                   vertex: Ints, known: Ints | None) -> Ints:
+    """Write or read the numbers of the new vertices' coordinates: (k, 3) int64.
+
+    The two coordinates across the surface's normal come first, against the mean of the ring; the one along it last,
+    against the plane of the arc through that mean, where the first two put it.
+    """
+    total, size = ring_sums(points, fans, arcs, vertex)
+    mean = (2 * total + size) // (2 * size)
+    normal = arc_normals(points, fans, arcs, vertex, grid.shift)
+    axis = np.abs(normal).argmax(axis=0)
+    columns = np.arange(len(vertex))
+    ring = fans.preceding.take(arcs.corner)
+    spread = np.zeros(len(vertex), np.int64)
+    for row in range(3):
+        off = np.abs(points[:, row].take(ring) - mean[row].take(arcs.split))
+        spread += np.bincount(arcs.split, off, len(vertex)).astype(np.int64)
+        spread += np.abs(points[:, row].take(vertex) - mean[row]) + np.abs(points[:, row].take(arcs.first_ring) - mean[row])
+    spread = spread // size
+    values = np.zeros((len(vertex), 3), np.int64)
+    moved = []
+    scale = spread
+    for step, model in enumerate(shape.models):
+        at = (axis + 1 + step) % 3
+        expected = mean[at, columns]
+        if step == 2:
+            lean = sum(normal[(axis + 1 + i) % 3, columns] * moved[i] for i in range(2))
+            divisor = normal[axis, columns]
+            divisor = np.where(divisor == 0, 1, divisor)
+            expected = expected - lean // divisor
+        number, place = _code_one(coder, model, grid, expected, scale, None if known is None else known[columns, at])
+        values[columns, at] = number
+        moved.append(place - mean[at, columns])
+        scale = (spread + 3 * np.abs(moved[-1]) + 1) >> 1
+    return values
+
+
+def _code_one(coder: Writer | Reader, model: Model, grid: Grid, expected: Ints, scale: Ints,
+              known: Ints | None) -> tuple[Ints, Ints]:
+    """Code one coordinate of each new vertex; return its number and its place on the grid of predictions."""
+    if grid.kind == 2:
+        guess = (expected / grid.scale).astype(np.float32)
+        base = place_of(guess)
+        # a step of the grid is worth so many floats, as a power of two: about 2 to the (23 - exponent) per unit
+        exponent = np.frexp(np.abs(expected).astype(np.float64) + scale)[1].astype(np.int64)
+        context = np.clip(size_class(scale)[0] + 2 * (24 - exponent), 0, CLASSES - 1)
+    else:
+        base = expected
+        context = np.minimum(size_class(scale)[0], CLASSES - 1)
+    rest = code_numbers(coder, model, context, None if known is None else known - base)
+    number = rest + base
+    if grid.kind == 2:
+        number = np.clip(number, -(1 << 31), (1 << 31) - 1)
+        return number, grid.predictors(number)
+    return number, number
+
+
+def lossless_grid(positions: np.ndarray) -> tuple[Grid, Ints]:
+    """Choose the coarsest way to write float32 positions exactly.
+
+    Parameters
+    ----------
+    positions : ndarray, (n, 3) float32
+    """
+    finite = positions[np.isfinite(positions).all(axis=1)].astype(np.float64)
+    largest = float(np.abs(finite).max(initial=0.0))
+    exponent = int(np.frexp(largest)[1]) if largest > 0 else 0
+    if len(finite) == len(positions):
+        steps = [(1, 10.0**digits) for digits in range(9)] + [(0, 2.0 ** (exponent - bits)) for bits in (12, 16, 20, 24)]
+        for kind, scale in steps:
+            count = largest * scale if kind == 1 else largest / scale
+            if count >= 1 << GRID_BITS:
+                continue
+            numbers = np.rint(finite * scale if kind == 1 else finite / scale).astype(np.int64)
+            grid = Grid(kind, scale, (0.0, 0.0, 0.0), 0)
+            if np.array_equal(grid.floats(numbers).view(np.uint32), positions.view(np.uint32)):
+                return _shifted(grid, numbers), numbers
+    grid = Grid(2, float(np.ldexp(1.0, GRID_BITS - 1 - exponent)), (0.0, 0.0, 0.0), 0)
+    numbers = place_of(positions)
+    return _shifted(grid, grid.predictors(numbers), keep=True), numbers
+
+
+def quantised_grid(positions: np.ndarray, bits: int) -> tuple[Grid, Ints]:
+    """Lay a grid of 2 to the `bits` steps over the longest side of the bounding box."""
+    values = positions.astype(np.float64)
+    low, high = values.min(axis=0, initial=np.inf), values.max(axis=0, initial=-np.inf)
+    extent = float((high - low).max()) if len(values) else 0.0
+    step = extent / ((1 << bits) - 1) if extent > 0 else 1.0
+    numbers = np.rint((values - low) / step).astype(np.int64) if len(values) else np.zeros((0, 3), np.int64)
+    origin = tuple(float(x) for x in low) if len(values) else (0.0, 0.0, 0.0)
+    return _shifted(Grid(0, step, origin, 0), numbers), numbers
+
+
+def _shifted(grid: Grid, predictors: Ints, *, keep: bool = False) -> Grid:
+    spread = int((predictors.max(axis=0) - predictors.min(axis=0)).max()) if len(predictors) else 0
+    return Grid(grid.kind, grid.scale, grid.origin, max(spread.bit_length() - _SHORT_BITS, 0))
+
+
+Points = Floats

@@ -1,0 +1,285 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The patches of a mesh in the order of the stream: base first, then batch after batch of splits."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..core.mesh import Ints
+from .batch_codec import Splits
+from .engine import endpoint_options, prepared, run_engine, tangled
+from .history import Batch, Unwinding
+from .source import Source
+
+_ROUNDS = 4
+
+
+@dataclass
+class Patches:
+    """A progressive mesh; p places, m faces of the splits' mesh, r faces beside it, w wedges, v vertices.
+
+    Attributes
+    ----------
+    places : ndarray, (p, 3) float32
+    parents : ndarray, (p,) int64
+        The place that each was split from, -1 in the base.
+    faces : ndarray, (3, m) int64
+        Corners of the finest mesh, as places.
+    batches : list of Splits
+    place_starts, face_starts : ndarray, (batches + 1,) int64
+        Places and faces before each batch, and after all.
+    extra : ndarray, (3, r) int64
+        Faces that no split touches.
+    wedge_starts : ndarray, (p + 1,) int64
+    wedge_parents : ndarray, (w,) int64
+        The wedge that each becomes where its place goes, -1 in the base.
+    wedge_vertex : ndarray, (w,) int64
+        The vertex of each wedge; ascending.
+    corner_wedge, extra_wedge : ndarray, (3, m) and (3, r) int64
+    edges : ndarray, (l, 2) int64
+        Loose edges as vertices.
+    columns : dict of list of ndarray
+        Attributes by domain: of vertices, wedges, faces (extra ones first) and sides.
+    vertex_order, face_order, face_turn : ndarray or None
+        The original's number of each vertex and face, and the column of each face's first corner.
+    """
+
+    places: np.ndarray
+    parents: Ints
+    faces: Ints
+    batches: list[Splits]
+    place_starts: Ints
+    face_starts: Ints
+    extra: Ints
+    wedge_starts: Ints
+    wedge_parents: Ints
+    wedge_vertex: Ints
+    corner_wedge: Ints
+    extra_wedge: Ints
+    turned: np.ndarray
+    edges: Ints
+    attributes: dict[str, dict[str, np.ndarray]]
+    vertex_order: Ints | None
+    face_order: Ints | None
+    face_turn: np.ndarray | None
+    errors: np.ndarray
+
+    @property
+    def vertices(self) -> int:
+        """Number of vertices of the finest mesh."""
+        return int(self.wedge_vertex[-1]) + 1 if len(self.wedge_vertex) else 0
+
+
+def make_patches(source: Source, target: int, options: dict[str, Any]) -> Generator[float, None, Patches]:
+    """Simplify down to about `target` faces and number everything in the order of the stream."""
+    chosen = endpoint_options(options)
+    finite = np.isfinite(source.places).all(axis=1)
+    able = np.flatnonzero(finite.take(source.faces).all(axis=1))
+    points = np.where(finite[:, None], source.places, 0).astype(np.float64)
+    mesh = prepared(points, source.faces.take(able, axis=0))
+    if mesh is None:
+        return _Numbering(source, None, np.zeros(0, np.int64), []).patches()
+    faces = able.take(mesh.face)
+    locked = np.zeros(len(points), bool)
+    beside = np.ones(len(source.faces), bool)
+    beside[faces] = False
+    locked[source.faces[beside]] = True
+    locked[source.vertex_place[source.edges]] = True
+    corner = _corner_columns(mesh.turned, mesh.faces.shape[1])
+    wedges = source.wedge.ravel().take(faces * 3 + corner)
+    unwinding = Unwinding(points, mesh.source.take(mesh.faces), wedges)
+    total = max(len(source.faces) - target, 1)
+    batches: list[Batch] = []
+    for attempt in range(_ROUNDS):
+        refused = unwinding.refused
+        if attempt:
+            mesh = prepared(points, unwinding.faces.T)
+            if mesh is None:
+                break
+        own = tangled(mesh.faces, mesh.points.shape[1]) | locked.take(mesh.source)
+        run = run_engine(mesh, own, chosen, target)
+        while True:
+            try:
+                yield min(max((len(source.faces) - next(run)) / total, 0.0), 1.0)
+            except StopIteration as end:
+                record = end.value
+                break
+        ends = np.append(record.batch_starts[1:], len(record))
+        for first, last in zip(record.batch_starts, ends, strict=True):
+            batch = unwinding.collapse(mesh.source.take(record.removed[first:last]),
+                                       mesh.source.take(record.kept[first:last]))
+            if batch is not None:
+                batches.append(batch)
+        if unwinding.refused == refused:
+            break
+        unwinding.frozen[:] = False
+    return _Numbering(source, unwinding, faces, batches[::-1], corner).patches()
+
+
+def _corner_columns(turned: np.ndarray | None, width: int) -> Ints:
+    """Return which corner of its input face each engine's corner is: (3, m) int64."""
+    columns = np.repeat(np.arange(3)[:, None], width, axis=1)
+    if turned is not None:
+        columns[1:, turned] = columns[:0:-1, turned]
+    return columns
+
+
+class _Numbering:
+    """Numbers places, faces, wedges and vertices from the base up."""
+
+    def __init__(self, source: Source, mesh: Unwinding | None, faces: Ints, batches: list[Batch],
+                 corner: Ints | None = None) -> None:
+        self.source, self.batches, self.input_face = source, batches, faces
+        self.corner = np.zeros((3, 0), np.int64) if corner is None else corner
+        count, width = len(source.places), len(faces)
+        self.place = np.full(count, -1)  # the stream's number of each place
+        self.face = np.full(width, -1)
+        self.turn = np.zeros(width, np.int64)  # the engine's row that is the stream's first
+        self.splits: list[Splits] = []
+        gone = np.zeros(count, bool)
+        for batch in batches:
+            gone[batch.new] = True
+        base = np.flatnonzero(~gone)
+        self.order = [self._along(base)]
+        self.place[self.order[0]] = np.arange(len(base))
+        self.parents = [np.full(len(base), -1)]
+        ids = np.zeros(0, np.int64) if mesh is None else mesh.ids
+        rows = np.zeros((3, 0), np.int64) if mesh is None else self.place.take(mesh.faces)
+        first = rows.argmin(axis=0) if rows.size else np.zeros(0, np.int64)
+        sorted_faces = np.argsort(rows.min(axis=0), kind="stable") if rows.size else np.zeros(0, np.int64)
+        self.face_ids = [ids.take(sorted_faces)]
+        self.face[self.face_ids[0]] = np.arange(len(ids))
+        self.turn[ids] = first
+        self.places, self.width = len(base), len(ids)
+        self.place_starts, self.face_starts = [self.places], [self.width]
+        for batch in batches:
+            self._number(batch)
+
+    def _along(self, base: Ints) -> Ints:
+        from ..core.mesh import morton_order
+        points = self.source.places[base].astype(np.float64)
+        points[~np.isfinite(points)] = 0
+        return base.take(morton_order(points)) if len(base) else base
+
+    def _number(self, batch: Batch) -> None:
+        old = self.place.take(batch.old)
+        order = np.argsort(old, kind="stable")
+        new, old = batch.new.take(order), old.take(order)
+        opened, row = batch.opened.take(order, axis=1), batch.opened_row.take(order, axis=1)
+        face, start_row = batch.start_face.take(order), batch.start_row.take(order)
+        start = (start_row - self.turn.take(face)) % 3 * self.width + self.face.take(face)
+        self.place[new] = self.places + np.arange(len(new))
+        there = opened >= 0
+        third = np.full(opened.shape, -1)
+        # before = (new, old, third): its first row is the new vertex's; after = (old, new, third): the one before it
+        for which in range(2):
+            ids = opened[which, there[which]]
+            self.turn[ids] = (row[which, there[which]] + 2 * which) % 3
+        ids = opened.T.ravel()
+        ids = ids[ids >= 0]
+        self.face[ids] = self.width + np.arange(len(ids))
+        self.face_ids.append(ids)
+        self.pending = (there, opened)
+        self.splits.append(Splits(old, start, batch.length.take(order), third, np.zeros((0, 3), np.int64)))
+        self._fill_third(batch, order, new, third, there, opened)
+        self.order.append(new)
+        self.parents.append(old)
+        self.places += len(new)
+        self.width += len(ids)
+        self.place_starts.append(self.places)
+        self.face_starts.append(self.width)
+
+    def _fill_third(self, batch: Batch, order: Ints, new: Ints, third: Ints, there: np.ndarray, opened: Ints) -> None:
+        at = np.flatnonzero(there.ravel())
+        third.ravel()[at] = self.place.take(batch.third.take(order, axis=1).ravel().take(at))
+
+    def patches(self) -> Patches:
+        source = self.source
+        order = np.concatenate(self.order)
+        ids = np.concatenate(self.face_ids)
+        counts = np.diff(source.wedge_starts).take(order)
+        starts = np.concatenate(([0], np.cumsum(counts)))
+        local = np.arange(starts[-1]) - np.repeat(starts[:-1], counts)
+        wedges = np.repeat(source.wedge_starts[:-1].take(order), counts) + local
+        old_vertex = source.wedge_vertex.take(wedges)
+        new_vertex = np.ones(len(wedges), bool)
+        new_vertex[1:] = old_vertex[1:] != old_vertex[:-1]
+        rows = (self.turn.take(ids) + np.arange(3)[:, None]) % 3
+        columns = self.corner.ravel().take(rows * self.corner.shape[1] + ids) if len(ids) else np.zeros((3, 0), np.int64)
+        input_face = self.input_face.take(ids)
+        corners = input_face * 3 + columns
+        beside = np.ones(len(source.faces), bool)
+        beside[self.input_face] = False
+        extra = np.flatnonzero(beside)
+        extra = extra.take(np.argsort(self.place.take(source.faces.take(extra, axis=0)).min(axis=1), kind="stable")
+                           if len(extra) else [])
+        turned = ((columns[1] - columns[0]) % 3 == 2).astype(np.uint8)
+        faces = self.place.take(source.faces.ravel().take(corners))
+        beside_corner = extra * 3 + np.arange(3)[:, None]
+        vertex_order = old_vertex[new_vertex]
+        face_order = np.concatenate((extra, input_face))
+        result = Patches(
+            source.places.take(order, axis=0), np.concatenate(self.parents), faces, self.splits,
+            np.array(self.place_starts), np.array(self.face_starts),
+            self.place.take(source.faces.ravel().take(beside_corner)), starts,
+            self._wedge_parents(starts), np.cumsum(new_vertex) - 1,
+            source.wedge.ravel().take(corners), source.wedge.ravel().take(beside_corner), turned,
+            np.zeros((0, 2), np.int64), {}, vertex_order, face_order,
+            np.concatenate((np.zeros(len(extra), np.int64), np.argmin(columns, axis=0) if len(ids) else columns[0])),
+            np.zeros(len(self.splits) + 1))
+        number = np.zeros(len(vertex_order), np.int64)
+        number[vertex_order] = np.arange(len(vertex_order))
+        edges = np.sort(number.take(source.edges), axis=1)
+        result.edges = edges[np.lexsort((edges[:, 1], edges[:, 0]))]
+        all_corners = np.concatenate((beside_corner, corners), axis=1)
+        corner_of = source.wedge_corner.take(wedges)
+        for domain, named in source.attributes.items():
+            result.attributes[domain] = {
+                name: _reordered(domain, array, vertex_order, corner_of, face_order, all_corners)
+                for name, array in named.items()}
+        return result
+
+    def _wedge_parents(self, starts: Ints) -> Ints:
+        """Return what each wedge becomes: the wedge that a fallen face joins to it, else the first that falls."""
+        parents = np.full(starts[-1], -1)
+        for batch, splits, first in zip(self.batches, self.splits, self.place_starts, strict=False):
+            order = np.argsort(self.place.take(batch.new), kind="stable")
+            opened_wedge = batch.opened_wedge.take(order, axis=2)
+            row, opened = batch.opened_row.take(order, axis=1), batch.opened.take(order, axis=1)
+            count = len(order)
+            begin, end = starts[first], starts[first + count]
+            split = np.repeat(np.arange(count), np.diff(starts[first : first + count + 1]))
+            local = np.arange(begin, end) - starts.take(first + split)
+            merged, known = np.zeros(end - begin, np.int64), np.zeros(end - begin, bool)
+            for same in (True, False):
+                for which in range(2):
+                    at_new = opened_wedge[row[which], which, np.arange(count)].take(split)
+                    at_old = opened_wedge[(row[which] + 1 + which) % 3, which, np.arange(count)].take(split)
+                    fits = ~known & (opened[which].take(split) >= 0)
+                    if same:
+                        fits &= at_new == local
+                    merged[fits] = at_old[fits]
+                    known |= fits
+            parents[begin:end] = merged + starts.take(splits.vertex.take(split))
+        return parents
+
+
+def _reordered(domain: str, array: np.ndarray, vertex_order: Ints, wedge_corner: Ints, face_order: Ints,
+               corners: Ints) -> np.ndarray:
+    """Put an attribute in the stream's order: corners' by wedge, sides' as rows of three."""
+    if domain == "vertex":
+        return array[vertex_order]
+    if domain == "face":
+        return array[face_order]
+    flat = array.reshape(-1, *array.shape[2:])
+    if domain == "side":
+        return flat[corners.T]
+    if len(flat) == 0:
+        return np.zeros((len(wedge_corner), *flat.shape[1:]), flat.dtype)
+    values = flat[wedge_corner.clip(min=0)]
+    values[wedge_corner < 0] = 0
+    return values

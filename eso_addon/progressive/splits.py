@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A batch of vertex splits: which corners go from each vertex to its new one, and the faces that open between both.
+
+A split at vertex v takes `length` consecutive corners around it, from `start`, to the new vertex u. Where the arc begins,
+face (u, v, x) opens (`before`), where it ends, face (v, u, y) (`after`); x and y are the first and last ring vertices of
+the arc. At a boundary one of the two may be missing; an arc without corners adds a lone face beside the start corner.
+All splits of a batch are carried out at once, in the mesh before the batch.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..core.mesh import Bools, Ints
+from .errors import StreamError
+from .fans import Fans
+
+
+@dataclass(frozen=True)
+class Arcs:
+    """The corners that change vertex: (a,) arrays, and the ends of each split's arc: (k,) arrays.
+
+    Attributes
+    ----------
+    split, corner : ndarray, (a,) int64
+        The split and the corner (as a place in the fans), step by step.
+    last : ndarray, (k,) int64
+        The last corner of each arc; the start where it has none.
+    first_ring, last_ring : ndarray, (k,) int64
+        The ring vertices x and y at which `before` and `after` open.
+    """
+
+    split: Ints
+    corner: Ints
+    last: Ints
+    first_ring: Ints
+    last_ring: Ints
+
+
+def walk(fans: Fans, start: Ints, length: Ints, before: Bools) -> Arcs:
+    """Follow each arc from its start.
+
+    Raises
+    ------
+    StreamError
+        An arc is longer than its fan.
+    """
+    last = start.copy()
+    chosen = np.flatnonzero(length > 0)
+    current = start.take(chosen)
+    splits, corners = [chosen], [current]
+    step = 1
+    while True:
+        further = np.flatnonzero(length.take(chosen) > step)
+        if len(further) == 0:
+            break
+        chosen, current = chosen.take(further), fans.successor.take(current.take(further))
+        if current.min() < 0 or step > len(fans.slot):
+            raise StreamError("the stream is damaged: a split leaves the surface; fetch the file again")
+        splits.append(chosen)
+        corners.append(current)
+        last[chosen] = current
+        step += 1
+    bare = length == 0
+    first_ring = fans.following.take(start)
+    last_ring = fans.preceding.take(last)
+    # beside a lone corner both new edges end at the same ring vertex
+    last_ring = np.where(bare & before, first_ring, last_ring)
+    first_ring = np.where(bare & ~before, last_ring, first_ring)
+    return Arcs(np.concatenate(splits), np.concatenate(corners), last, first_ring, last_ring)
+
+
+@dataclass(frozen=True)
+class Openings:
+    """The third corners of the new faces: (2, k) arrays, row 0 `before`, row 1 `after`.
+
+    Attributes
+    ----------
+    there : ndarray, (2, k) bool
+    third : ndarray, (2, k) int64
+        In the mesh after the batch, except where `torn`: there it is the vertex before the batch, or its new one.
+    torn : ndarray, (2, k) bool
+        The edge at which the face opens is opened from its other end too.
+    """
+
+    there: Bools
+    third: Ints
+    torn: Bools
+
+
+def openings(fans: Fans, arcs: Arcs, vertex: Ints, start: Ints, there: Bools, faces: Ints, count: int) -> Openings:
+    """Find the third corners of the new faces.
+
+    Parameters
+    ----------
+    fans, arcs
+        Of the mesh before the batch.
+    vertex, start : ndarray, (k,) int64
+    there : ndarray, (2, k) bool
+    faces : ndarray, (3, m) int64
+        With the corners of the arcs moved to the new vertices.
+    count : int
+        Number of vertices before the batch.
+    """
+    ring = np.stack((arcs.first_ring, arcs.last_ring))
+    keys = vertex * count + ring
+    cut = np.sort(keys[there])
+    back = ring * count + vertex
+    place = np.searchsorted(cut, back).clip(max=max(len(cut) - 1, 0))
+    torn = there & (cut.take(place) == back) if len(cut) else there & False
+    width = faces.shape[1]
+    flat = faces.ravel()
+    size = len(flat)
+    # the neighbour of the new face holds the ring vertex as it is after the batch
+    bare_after = there[1] & ~there[0] & (arcs.first_ring != fans.following.take(start))
+    first = flat.take((fans.slot.take(start) + width) % max(size, 1)) if size else ring[0]
+    last = flat.take((fans.slot.take(arcs.last) + 2 * width) % max(size, 1)) if size else ring[1]
+    third = np.stack((np.where(bare_after, last, first), last))
+    return Openings(there, np.where(torn, ring, third), torn)
