@@ -6,9 +6,9 @@ from __future__ import annotations
 import numpy as np
 
 from ..core.mesh import Ints
-from . import rans
 from .bits import BitReader, pack
 from .models import Model
+from .rans import RansReader
 
 # a number's class: its length in bits and the bit below its highest one
 CLASSES = 72
@@ -18,7 +18,7 @@ class Writer:
     """Collects symbols and plain bits of a batch."""
 
     def __init__(self) -> None:
-        self._phases: list[tuple[Ints, Ints]] = []
+        self._runs: list[tuple[Ints, Ints]] = []
         self._values: list[Ints] = []
         self._widths: list[Ints] = []
 
@@ -27,7 +27,7 @@ class Writer:
         assert known is not None
         frequency, start = model.frequencies()
         place = context * frequency.shape[1] + known
-        self._phases.append((frequency.take(place), start.take(place)))
+        self._runs.append((frequency.take(place), start.take(place)))
         model.learn(context, known)
         return known
 
@@ -38,19 +38,22 @@ class Writer:
         self._widths.append(widths)
         return known
 
-    def finish(self) -> tuple[int, bytes, bytes]:
-        """Return the number of lanes, the symbols' bytes and the plain bits' bytes."""
-        lanes = rans.lanes_for(sum(len(frequency) for frequency, _ in self._phases))
+    @property
+    def runs(self) -> list[tuple[Ints, Ints]]:
+        """Frequency and start of each symbol, run by run."""
+        return self._runs
+
+    def plain(self) -> bytes:
+        """Return the plain bits."""
         none = [np.zeros(0, np.int64)]
-        return (lanes, rans.encode(self._phases, lanes),
-                pack(np.concatenate(none + self._values), np.concatenate(none + self._widths)))
+        return pack(np.concatenate(none + self._values), np.concatenate(none + self._widths))
 
 
 class Reader:
     """Gives symbols and plain bits of a batch back."""
 
-    def __init__(self, lanes: int, symbols: bytes, plain: bytes) -> None:
-        self._symbols = rans.RansReader(symbols, lanes)
+    def __init__(self, symbols: RansReader, plain: bytes) -> None:
+        self._symbols = symbols
         self._plain = BitReader(plain)
 
     def symbols(self, model: Model, context: Ints, known: Ints | None) -> Ints:

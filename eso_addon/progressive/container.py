@@ -153,7 +153,7 @@ def _header(text: bytes) -> dict[str, Any]:
         header = json.loads(inflate(text, _LARGEST_HEADER))
         needs = header["needs"]
         for name, kind in (("places", int), ("faces", int), ("extra", int), ("edges", int), ("vertices", int),
-                           ("wedges", int), ("grid", list), ("attributes", list), ("optional", list), ("hash", str)):
+                           ("wedges", int), ("lanes", int), ("grid", list), ("attributes", list), ("optional", list), ("hash", str)):
             if not isinstance(header[name], kind) or (kind is int and not 0 <= header[name] < 1 << 31):
                 raise TypeError
         unknown = sorted(set(needs) - set(FEATURES))

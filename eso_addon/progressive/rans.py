@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Range asymmetric numeral systems on many lanes at once (Duda 2013): symbol i is in lane i modulo the lanes."""
+"""Range asymmetric numeral systems on many lanes at once (Duda 2013): symbol i of a run is in lane i modulo the lanes.
+
+The lanes' states go on from batch to batch, so that a batch costs nothing but its words.
+"""
 
 import numpy as np
 
@@ -10,58 +13,69 @@ from .models import SCALE, SCALE_BITS
 _LEAST = 1 << 16
 
 
-def lanes_for(symbols: int) -> int:
-    """Return how many lanes pay for so many symbols: a power of two from 1 to 512."""
-    return 1 << min(max(symbols // 600, 1).bit_length() - 1, 9)
+def lanes_for(places: int) -> int:
+    """Return how many lanes pay for a mesh of so many places: a power of two from 4 to 512."""
+    return 1 << min(max(places // 256, 4).bit_length() - 1, 9)
 
 
-def encode(phases: list[tuple[Ints, Ints]], lanes: int) -> bytes:
-    """Write symbols.
+def encode(batches: list[list[tuple[Ints, Ints]]], lanes: int) -> tuple[bytes, list[bytes]]:
+    """Write symbols, last one first.
 
     Parameters
     ----------
-    phases : list of (frequency, start), each (n,) int64
-        Of each symbol, in the order of reading; each phase begins in lane 0.
+    batches : list of lists of (frequency, start), each (n,) int64
+        Of each symbol, run by run, in the order of reading; each run begins in lane 0.
     lanes : int
 
     Returns
     -------
-    bytes
-        The lanes' states, 4 bytes each, then words of 2 bytes in the order of reading.
+    states : bytes
+        The lanes' states, 4 bytes each.
+    words : list of bytes
+        Of each batch: words of 2 bytes in the order of reading.
     """
     state = np.full(lanes, _LEAST, np.int64)
+    parts = [_encode_batch(runs, state) for runs in reversed(batches)]
+    return state.astype("<u4").tobytes(), parts[::-1]
+
+
+def _encode_batch(runs: list[tuple[Ints, Ints]], state: Ints) -> bytes:
     words: list[np.ndarray] = []
-    for frequency, start in reversed(phases):
+    lanes = len(state)
+    for frequency, start in reversed(runs):
         limit = frequency << (32 - SCALE_BITS)
         for first in range((len(frequency) - 1) // lanes * lanes, -1, -lanes):
-            part = slice(first, first + lanes)
-            own = frequency[part]
+            own = frequency[first : first + lanes]
             active = state[: len(own)]
-            full = np.flatnonzero(active >= limit[part])
+            full = (active >= limit[first : first + lanes]).nonzero()[0]
             if len(full):
                 held = active.take(full)
                 words.append(held & 0xFFFF)
                 active[full] = held >> 16
-            quotient, rest = np.divmod(active, own)
-            active[:] = (quotient << SCALE_BITS) + rest + start[part]
+            quotient = active // own
+            # the state becomes quotient * 2^12 + rest + start
+            active += quotient * (SCALE - own)
+            active += start[first : first + lanes]
     body = np.concatenate(words[::-1]) if words else np.zeros(0, np.int64)
-    return state.astype("<u4").tobytes() + body.astype("<u2").tobytes()
+    return body.astype("<u2").tobytes()
 
 
 class RansReader:
-    """Reads what `encode` wrote.
+    """Reads what `encode` wrote, batch by batch.
 
     Parameters
     ----------
-    data : bytes
-    lanes : int
+    states : bytes
     """
 
-    def __init__(self, data: bytes, lanes: int) -> None:
-        if len(data) < 4 * lanes or len(data) % 2:
-            raise StreamError("the stream is damaged: a batch is too short; fetch the file again")
-        self._state = np.frombuffer(data[: 4 * lanes], "<u4").astype(np.int64)
-        self._words = np.frombuffer(data[4 * lanes :], "<u2").astype(np.int64)
+    def __init__(self, states: bytes) -> None:
+        self._state = np.frombuffer(states, "<u4").astype(np.int64)
+        self._words = np.zeros(0, np.int64)
+        self._position = 0
+
+    def feed(self, words: bytes) -> None:
+        """Go on with the next batch."""
+        self._words = np.frombuffer(words, "<u2").astype(np.int64)
         self._position = 0
 
     def read(self, context: Ints, frequency: Ints, start: Ints) -> Ints:
@@ -72,16 +86,24 @@ class RansReader:
         context : ndarray, (n,) int64
         frequency, start : ndarray, (contexts, symbols) int64
         """
-        symbols = frequency.shape[1]
-        widths = frequency.ravel()
+        if len(context) == 0:
+            return context
+        used = np.flatnonzero(np.bincount(context, minlength=len(frequency)))
+        row = np.zeros(len(frequency), np.int64)
+        row[used] = np.arange(len(used))
+        widths = frequency.take(used, axis=0).ravel()
         symbol_of = np.repeat(np.arange(len(widths)), widths)
         width_of = widths.take(symbol_of)
-        bias_of = (np.arange(len(symbol_of)) & (SCALE - 1)) - start.ravel().take(symbol_of)
-        base = context << SCALE_BITS
-        slots = np.zeros(len(context), np.int64)
+        bias_of = (np.arange(len(symbol_of)) & (SCALE - 1)) - start.take(used, axis=0).ravel().take(symbol_of)
+        rows = row.take(context)
+        slots = self._slots(rows << SCALE_BITS, width_of, bias_of)
+        return symbol_of.take(slots) - rows * frequency.shape[1]
+
+    def _slots(self, base: Ints, width_of: Ints, bias_of: Ints) -> Ints:
+        slots = np.zeros(len(base), np.int64)
         state, words, position = self._state, self._words, self._position
         lanes = len(state)
-        for first in range(0, len(context), lanes):
+        for first in range(0, len(base), lanes):
             slot = base[first : first + lanes]
             active = state[: len(slot)]
             slot = slot + (active & (SCALE - 1))
@@ -96,4 +118,4 @@ class RansReader:
                 position += len(short)
             state[: len(slot)] = active
         self._position = position
-        return symbol_of.take(slots) - context * symbols
+        return slots

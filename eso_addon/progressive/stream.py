@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..core.mesh import Ints
-from . import container
+from . import container, rans
 from .batch_codec import Connectivity, Done, Mesh, Splits, code_batch
 from .coder import Reader, Writer
 from .columns import ColumnReader, ColumnWriter, as_words, from_words
@@ -20,7 +20,7 @@ from .errors import StreamError
 from .geometry import Grid, Shape, lossless_grid, quantised_grid
 from .patches import Patches
 
-_BLOCK = struct.Struct("<BIII")  # lanes as a power of two, bytes of symbols, of plain bits, of columns
+_BLOCK = struct.Struct("<II")  # bytes of symbols, of plain bits; columns fill the rest
 _DOMAINS = ("vertex", "corner", "face", "side")
 
 
@@ -280,7 +280,8 @@ def encode(patches: Patches, *, bits: int | None, keep_order: bool, meta: dict[s
         "places": len(patches.places), "faces": patches.faces.shape[1], "extra": patches.extra.shape[1],
         "edges": len(patches.edges), "vertices": patches.vertices, "wedges": len(patches.wedge_vertex),
         "grid": [grid.kind, grid.scale, *grid.origin, grid.shift], "needs": needs,
-        "attributes": attributes, "hash": digest(patches), "meta": meta}
+        "attributes": attributes, "hash": digest(patches), "meta": meta,
+        "lanes": rans.lanes_for(len(patches.places))}
     if bits is not None:
         header["bits"] = bits
     codec = _Codec(header, patches.place_starts, patches.face_starts, patches, numbers, grid, False)
@@ -290,15 +291,17 @@ def encode(patches: Patches, *, bits: int | None, keep_order: bool, meta: dict[s
     codec.state_wedge = _wedges_at_base(patches, several)
     block = ColumnWriter()
     codec.base(block)
-    blocks = [block.finish()]
+    base = block.finish()
+    parts, runs = [], []
     for splits in patches.batches:
         first = codec.mesh.vertex_count
         writer, block = Writer(), ColumnWriter()
         codec.batch(writer, block, replace(splits, numbers=numbers[first : first + len(splits.vertex)]))
-        lanes, symbols, plain = writer.finish()
-        columns = block.finish()
-        blocks.append(_BLOCK.pack(lanes.bit_length() - 1, len(symbols), len(plain), len(columns))
-                      + symbols + plain + columns)
+        runs.append(writer.runs)
+        parts.append((writer.plain(), block.finish()))
+    states, words = rans.encode(runs, header["lanes"])
+    blocks = [base + states] + [_BLOCK.pack(len(symbols), len(plain)) + symbols + plain + columns
+                                for symbols, (plain, columns) in zip(words, parts, strict=True)]
     table = container.make_table(blocks, patches.place_starts, patches.face_starts, patches.errors)
     optional = {"order": _order_block(patches)} if keep_order else {}
     return container.write(Container(header, table, blocks, optional))
@@ -371,9 +374,13 @@ def decode(data: bytes, *, partial: bool = False) -> tuple[Patches, dict[str, An
         if items * sizes[domain] > limit:
             raise StreamError("the stream's counts are larger than it can hold: fetch the file again")
         codec.words.setdefault(domain, []).append((name, np.zeros((sizes[domain], items), np.int64), min(dtype.itemsize, 4)))
-    codec.base(ColumnReader(parts.blocks[0]))
+    states = 4 * header["lanes"]
+    if not 0 < states <= len(parts.blocks[0]):
+        raise StreamError("the header of the stream says nothing sensible: fetch the file again")
+    codec.base(ColumnReader(parts.blocks[0][:-states]))
+    symbols = rans.RansReader(parts.blocks[0][-states:])
     for number in range(1, given):
-        _read_batch(codec, parts.blocks[number])
+        _read_batch(codec, symbols, parts.blocks[number])
         if codec.mesh.vertex_count != places[number] or codec.mesh.face_count != faces[number]:
             raise StreamError("the stream is damaged: a batch holds other counts than its table; fetch the file again")
     _finish(patches, codec, descriptors, given)
@@ -385,14 +392,15 @@ def decode(data: bytes, *, partial: bool = False) -> tuple[Patches, dict[str, An
     return patches, header, parts.damage
 
 
-def _read_batch(codec: _Codec, data: bytes) -> None:
+def _read_batch(codec: _Codec, reader: rans.RansReader, data: bytes) -> None:
     if len(data) < _BLOCK.size:
         raise StreamError("the stream is damaged: a batch is too short; fetch the file again")
-    lanes, symbols, plain, columns = _BLOCK.unpack_from(data)
-    if lanes > 16 or _BLOCK.size + symbols + plain + columns != len(data) or plain % 4:
-        raise StreamError("the stream is damaged: a batch's parts do not fit; fetch the file again")
+    symbols, plain = _BLOCK.unpack_from(data)
     begin = _BLOCK.size
-    coder = Reader(1 << lanes, data[begin : begin + symbols], data[begin + symbols : begin + symbols + plain])
+    if begin + symbols + plain > len(data) or plain % 4 or symbols % 2:
+        raise StreamError("the stream is damaged: a batch's parts do not fit; fetch the file again")
+    reader.feed(data[begin : begin + symbols])
+    coder = Reader(reader, data[begin + symbols : begin + symbols + plain])
     codec.batch(coder, ColumnReader(data[begin + symbols + plain :]), None)
 
 
