@@ -168,7 +168,7 @@ def test_a_count_above_the_inputs_gives_the_input(more: int, placement: str) -> 
 
 @pytest.mark.parametrize("ratio", [0, -0.5, 1.5, float("nan"), float("inf")])
 def test_a_ratio_that_is_none(ratio: float) -> None:
-    with pytest.raises(MeshError, match="above 0 and at most 1"):
+    with pytest.raises(MeshError, match="ratio is .*: give a number"):
         simplify(*BALL, ratio=ratio)
 
 

@@ -14,7 +14,6 @@ from eso_addon.core.deviation import Deviation, measure
 from eso_addon.core.manifold import boundary_sides
 from eso_addon.core.prepare import Prepared, prepare
 from eso_addon.core.quadrics import anchored, area_normals, boundary_quadrics, plane_quadrics
-from eso_addon.core.simplify import Options
 from eso_addon.core.variation import surface_variation
 
 from . import shapes
@@ -26,7 +25,6 @@ SAMPLES = 10_000
 
 def quadrics_of(mesh: Prepared, method: str) -> Floats:
     """Return Equation 9 with boundary planes, put together from the public parts."""
-    options = Options()
     parts = plane_quadrics(mesh.points, mesh.faces, area_weighted=True)
     if mesh.opened.any():
         sides = boundary_sides(mesh.faces, mesh.opened)
@@ -35,9 +33,9 @@ def quadrics_of(mesh: Prepared, method: str) -> Floats:
         edges = np.stack((mesh.faces.ravel()[sides], np.roll(mesh.faces, -1, axis=0).ravel()[sides]))
         parts += boundary_quadrics(mesh.points, normals[:, face] / areas[face], edges, 1.0)
     if method == "eso":
-        weights = surface_variation(mesh.points.T, mesh.faces.T, options.rings)
-        parts *= (weights / weights.mean()) ** options.weight_power
-    return anchored(parts, mesh.points, options.memory)
+        weights = surface_variation(mesh.points.T, mesh.faces.T, 3)
+        parts *= (weights / weights.mean()) ** 0.5
+    return anchored(parts, mesh.points, Rules().memory)
 
 
 def engine(mesh: Prepared, quadrics: Floats, rules: Rules, target: int) -> Mesh:

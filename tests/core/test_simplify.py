@@ -328,16 +328,16 @@ def test_refit_improves_the_fit_and_nothing_else() -> None:
 @pytest.mark.parametrize(("arguments", "words"), [
     ({}, "give one target"),
     ({"ratio": 0.5, "faces_target": 3}, "give one target"),
-    ({"ratio": 0.0}, "above 0"),
-    ({"ratio": -1.0}, "above 0"),
-    ({"ratio": 1.0001}, "at most 1"),
-    ({"ratio": float("nan")}, "above 0"),
-    ({"faces_target": 0}, "at least 1"),
-    ({"faces_target": -5}, "at least 1"),
-    ({"faces_target": 2.5}, "whole number"),
-    ({"max_error": -0.1}, "at least 0"),
-    ({"max_error": float("nan")}, "at least 0"),
-    ({"max_error": float("inf")}, "at least 0"),
+    ({"ratio": 0.0}, "ratio is .*: give"),
+    ({"ratio": -1.0}, "ratio is .*: give"),
+    ({"ratio": 1.0001}, "ratio is .*: give"),
+    ({"ratio": float("nan")}, "ratio is .*: give"),
+    ({"faces_target": 0}, "faces_target is .*: give"),
+    ({"faces_target": -5}, "faces_target is .*: give"),
+    ({"faces_target": 2.5}, "faces_target is .*: give"),
+    ({"max_error": -0.1}, "max_error is .*: give"),
+    ({"max_error": float("nan")}, "max_error is .*: give"),
+    ({"max_error": float("inf")}, "max_error is .*: give"),
     ({"ratio": 0.5, "method": "best"}, "choose one of"),
     ({"ratio": 0.5, "preset": "best"}, "choose one of"),
     ({"ratio": 0.5, "placement": "middle"}, "choose"),
@@ -353,16 +353,13 @@ def test_requests_without_meaning_are_refused(arguments: dict[str, Any], words: 
     assert "\n" not in str(caught.value)
 
 
-NO_NUMBER = pytest.mark.xfail(reason="a value that is no number raises TypeError, ValueError or OverflowError")
-
-
 @pytest.mark.parametrize("arguments", [
-    pytest.param({"ratio": "half"}, marks=NO_NUMBER),
-    pytest.param({"faces_target": float("nan")}, marks=NO_NUMBER),
-    pytest.param({"faces_target": float("inf")}, marks=NO_NUMBER),
-    pytest.param({"ratio": 0.5, "share": float("nan")}, marks=NO_NUMBER),
-    pytest.param({"ratio": 0.5, "rings": float("nan")}, marks=NO_NUMBER),
-    pytest.param({"ratio": 0.5, "rings": None}, marks=NO_NUMBER),
+    {"ratio": "half"},
+    {"faces_target": float("nan")},
+    {"faces_target": float("inf")},
+    {"ratio": 0.5, "share": float("nan")},
+    {"ratio": 0.5, "rings": float("nan")},
+    {"ratio": 0.5, "rings": None},
     {"ratio": 0.5, "share": 0.0}, {"ratio": 0.5, "flip": 2.0}, {"ratio": 0.5, "memory": -1.0},
     {"ratio": 0.5, "memory": 0.0}, {"ratio": 0.5, "boundary_weight": -1.0}, {"ratio": 0.5, "threads": -1},
     {"ratio": 0.5, "weight_power": float("nan")},
