@@ -13,7 +13,7 @@ PACKAGE = ROOT / "eso_addon"
 # What each storey may import of the ones below, and of the outside beyond the standard library.
 BELOW = {
     "core": set(),
-    "progressive": {"core"},
+    "progressive": {"core", "files"},
     "files": set(),
     "bridge": {"core", "progressive", "files"},
     "jobs": {"core"},

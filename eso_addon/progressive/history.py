@@ -45,6 +45,9 @@ class Batch:
 class Unwinding:
     """The mesh on its way down, batch by batch.
 
+    A collapse that cannot be taken over is `held`: its vertex stays for good. What the engine did around it afterwards
+    rests on it, and is `frozen`, until the engine is run again on what is left.
+
     Parameters
     ----------
     points : ndarray, (n, 3) float64
@@ -59,7 +62,7 @@ class Unwinding:
         self.wedges = wedges
         self.ids = np.arange(faces.shape[1])
         self.frozen = np.zeros(len(points), bool)
-        self.refused = 0
+        self.held = np.zeros(len(points), bool)
         self._label = np.full(len(points), -1)
         self._goes = np.arange(len(points))
         self._chosen = np.zeros(len(points), bool)
@@ -67,9 +70,10 @@ class Unwinding:
     def collapse(self, new: Ints, old: Ints) -> Batch | None:
         """Carry out a batch of half-edge collapses, less those that are not the inverse of a clean split."""
         able = ~(self.frozen.take(new) | self.frozen.take(old))
+        held = np.zeros(0, np.int64)
         while True:
+            self.held[held] = True
             self._freeze(new[~able])
-            self.refused += int((~able).sum())
             new, old = new[able], old[able]
             if len(new) == 0:
                 return None
@@ -83,6 +87,7 @@ class Unwinding:
             if not attempt.bad.any():
                 return attempt.accept()
             able = ~attempt.bad
+            held = new[attempt.bad]
 
     def _freeze(self, new: Ints) -> None:
         if len(new) == 0:

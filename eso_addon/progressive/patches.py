@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Generator
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from .engine import endpoint_options, prepared, run_engine, tangled
 from .history import Batch, Unwinding
 from .source import Source
 
-_ROUNDS = 4
+_ROUNDS = 12
 
 
 @dataclass
@@ -44,6 +45,10 @@ class Patches:
         Loose edges as vertices.
     columns : dict of list of ndarray
         Attributes by domain: of vertices, wedges, faces (extra ones first) and sides.
+    errors : ndarray, (batches + 1,) float64
+        Estimated deviation of the base, and after each batch.
+    opened : ndarray, (p,) uint8
+        Faces that open with each place.
     vertex_order, face_order, face_turn : ndarray or None
         The original's number of each vertex and face, and the column of each face's first corner.
     """
@@ -67,6 +72,7 @@ class Patches:
     face_order: Ints | None
     face_turn: np.ndarray | None
     errors: np.ndarray
+    opened: np.ndarray
 
     @property
     def vertices(self) -> int:
@@ -95,12 +101,12 @@ def make_patches(source: Source, target: int, options: dict[str, Any]) -> Genera
     total = max(len(source.faces) - target, 1)
     batches: list[Batch] = []
     for attempt in range(_ROUNDS):
-        refused = unwinding.refused
+        held = int(unwinding.held.sum())
         if attempt:
             mesh = prepared(points, unwinding.faces.T)
             if mesh is None:
                 break
-        own = tangled(mesh.faces, mesh.points.shape[1]) | locked.take(mesh.source)
+        own = tangled(mesh.faces, mesh.points.shape[1]) | (locked | unwinding.held).take(mesh.source)
         run = run_engine(mesh, own, chosen, target)
         while True:
             try:
@@ -108,13 +114,12 @@ def make_patches(source: Source, target: int, options: dict[str, Any]) -> Genera
             except StopIteration as end:
                 record = end.value
                 break
-        ends = np.append(record.batch_starts[1:], len(record))
-        for first, last in zip(record.batch_starts, ends, strict=True):
+        for first, last in pairwise([*record.batch_starts, len(record)]):
             batch = unwinding.collapse(mesh.source.take(record.removed[first:last]),
                                        mesh.source.take(record.kept[first:last]))
             if batch is not None:
                 batches.append(batch)
-        if unwinding.refused == refused:
+        if int(unwinding.held.sum()) == held:
             break
         unwinding.frozen[:] = False
     return _Numbering(source, unwinding, faces, batches[::-1], corner).patches()
@@ -222,6 +227,8 @@ class _Numbering:
         beside_corner = extra * 3 + np.arange(3)[:, None]
         vertex_order = old_vertex[new_vertex]
         face_order = np.concatenate((extra, input_face))
+        opened = np.concatenate([np.zeros(self.place_starts[0], np.uint8),
+                                 *((splits.third >= 0).sum(axis=0).astype(np.uint8) for splits in self.splits)])
         result = Patches(
             source.places.take(order, axis=0), np.concatenate(self.parents), faces, self.splits,
             np.array(self.place_starts), np.array(self.face_starts),
@@ -230,7 +237,7 @@ class _Numbering:
             source.wedge.ravel().take(corners), source.wedge.ravel().take(beside_corner), turned,
             np.zeros((0, 2), np.int64), {}, vertex_order, face_order,
             np.concatenate((np.zeros(len(extra), np.int64), np.argmin(columns, axis=0) if len(ids) else columns[0])),
-            np.zeros(len(self.splits) + 1))
+            np.zeros(len(self.splits) + 1), opened)
         number = np.zeros(len(vertex_order), np.int64)
         number[vertex_order] = np.arange(len(vertex_order))
         edges = np.sort(number.take(source.edges), axis=1)

@@ -91,12 +91,7 @@ class Progressive:
     def _faces_after(self) -> Ints:
         """Faces of the splits' mesh once each place is there: (p,) int64."""
         patches = self._patches
-        base = int(patches.place_starts[0])
-        # a face is there as soon as its last corner is
-        born = np.maximum.accumulate(patches.faces.max(axis=0)) if patches.faces.size else np.zeros(0, np.int64)
-        after = np.searchsorted(born, np.arange(len(patches.places)), side="right")
-        after[:base] = patches.face_starts[0]
-        return after
+        return int(patches.face_starts[0]) + np.cumsum(patches.opened, dtype=np.int64)
 
     def at(self, *, faces: int | None = None, vertices: int | None = None, error: float | None = None) -> Level:
         """Return the level with at most so many triangles or vertices, or the coarsest within an error.

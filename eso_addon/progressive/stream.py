@@ -75,6 +75,8 @@ class _Codec:
         mesh = self.mesh
         places, faces = mesh.vertex_count, mesh.face_count
         done = code_batch(coder, self.connectivity, self.shape, mesh, splits)
+        if self.reading:
+            self.patches.opened[places : mesh.vertex_count] = done.there.sum(axis=0)
         if self.columns or self.reading:
             self._places_wedges(block, places, mesh.vertex_count)
             self._moved_wedges(block, done, faces)
@@ -365,7 +367,8 @@ def decode(data: bytes, *, partial: bool = False) -> tuple[Patches, dict[str, An
     patches = Patches(np.zeros((0, 3), np.float32), none, np.zeros((3, 0), np.int64), [], places, faces,
                       np.zeros((3, 0), np.int64), np.zeros(count + 1, np.int64), np.full(wedges, -1), np.zeros(wedges, np.int64),
                       np.zeros((3, 0), np.int64), np.zeros((3, 0), np.int64), np.zeros(width, np.uint8),
-                      np.zeros((0, 2), np.int64), {}, None, None, None, table["error"][:given].astype(np.float64))
+                      np.zeros((0, 2), np.int64), {}, None, None, None, table["error"][:given].astype(np.float64),
+                      np.zeros(count, np.uint8))
     codec = _Codec(header, places, faces, patches, none, grid, True)
     descriptors = _descriptors(header)
     sizes = {"vertex": header["vertices"], "corner": wedges, "face": extra + width, "side": extra + width}
