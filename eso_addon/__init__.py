@@ -13,16 +13,20 @@ if TYPE_CHECKING:
     from .core.mesh import MeshError
     from .core.simplify import SimplifyResult, lod_chain, lod_chain_steps, simplify, simplify_steps
     from .core.variation import vertex_weights
+    from .progressive.progressive import Progressive, load_progressive, progressive
 
 __version__ = "0.1.0"
 
 __all__ = [
     "Deviation",
     "MeshError",
+    "Progressive",
     "SimplifyResult",
     "lod_chain",
     "lod_chain_steps",
+    "load_progressive",
     "measure",
+    "progressive",
     "register",
     "simplify",
     "simplify_steps",
@@ -33,10 +37,13 @@ __all__ = [
 _MODULE_OF_NAME = {
     "Deviation": "core.deviation",
     "MeshError": "core.mesh",
-    "SimplifyResult": "core.simplify",
+    "SimplifyResult": "core.levels",
     "lod_chain": "core.simplify",
     "lod_chain_steps": "core.simplify",
+    "Progressive": "progressive.progressive",
+    "load_progressive": "progressive.progressive",
     "measure": "core.deviation",
+    "progressive": "progressive.progressive",
     "simplify": "core.simplify",
     "simplify_steps": "core.simplify",
     "vertex_weights": "core.variation",

@@ -87,6 +87,11 @@ class Progressive:
         """Triangles of the base and after each batch: (batches + 1,) int64."""
         return self._patches.face_starts + self._patches.extra.shape[1]
 
+    @property
+    def attribute_names(self) -> dict[str, list[str]]:
+        """Names of the attributes by domain."""
+        return {domain: list(named) for domain, named in self._patches.attributes.items() if named}
+
     @cached_property
     def _faces_after(self) -> Ints:
         """Faces of the splits' mesh once each place is there: (p,) int64."""
