@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The engine: collapses edges in batches, whole arrays at a time: weigh, choose, test, collapse, update.
 
-A batch holds edges that are cheapest at both their ends, so no two of them share a vertex. It is ordered by cost, and each
-collapse is tested in the state that the cheaper ones of its batch leave: any prefix of the record is a valid mesh.
+A batch holds edges that are cheapest at both their ends, so no two of them share a vertex. It is ordered by cost, and
+each collapse is tested in the state that the cheaper ones leave: any prefix of the record is a valid mesh.
 
-Faces are three rows of corners; the side from corner j to the next has a cost in row j, finite in one of its two faces only
-(where the corner has the lower number), so edges need no list of their own.
+Faces are three rows of corners; the side from corner j to the next has a cost in row j, finite in one of its two faces
+only (where the corner has the lower number), so edges need no list of their own.
 """
 
 from collections.abc import Generator
@@ -14,9 +14,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from .blocks import Blocks
+from .manifold import boundary_fans
 from .mesh import Bools, Floats, Ints
 from .quadrics import (
     WIDTH,
+    Components,
     cross,
     endpoint_costs,
     move_memory,
@@ -35,8 +37,8 @@ _GATHER = pow(_SCATTER, -1, 1 << 32)
 _BLOCK = 16384
 _SAMPLES = 8192
 # with fewer faces than this the share shrinks with them, to this part: small meshes are collapsed with more care
-_LARGE = 50_000
-_CAREFUL = 0.2
+_LARGE = 20_000
+_CAREFUL = 0.3
 
 
 @dataclass(frozen=True)
@@ -65,7 +67,7 @@ class Rules:
     memory: float = 1e-9
     flip: float = 0.5
     guard: bool = True
-    share: float = 0.4
+    share: float = 0.5
     spread: float = 3.0
     curvature_factor: bool = False
 
@@ -80,6 +82,7 @@ class _State:
     quadrics: Floats  # (n, 12)
     faces: Ints  # (3, m)
     boundary: Bools  # (n + 1,)
+    fans: Ints  # (n + 1,) runs of faces from boundary to boundary
     locked: Bools | None  # (n,)
     alive: int
     costs: np.ndarray = field(init=False)  # (3, m) float32
@@ -91,8 +94,9 @@ class _State:
         sides = self.points.take(self.faces[0], axis=0) - self.points.take(self.faces[1], axis=0)
         # normals are compared in single precision: in units of an edge their squares neither vanish nor overflow
         self.unit = 1.0 / max(float(np.sqrt((sides * sides).sum(axis=1)).mean()), 1e-300)
-        self.before = (self.points * self.unit).astype(np.float32)
-        self.after = self.before.copy()  # as the batch would have it
+        before = (self.points * self.unit).astype(np.float32)
+        self.rows = np.concatenate((before, before))
+        self.before, self.after = self.rows[: count + 1], self.rows[count + 1 :]  # `after` as the batch would have it
         self.open = bool(self.boundary.any())
         self.best = np.full(count + 1, _NONE)
         self.label = ~np.arange(count + 1)  # of vertices in no collapse: negative, each its own
@@ -118,6 +122,7 @@ class _Batch:
     places: Floats  # (c, 4)
     stays: Bools
     bad: Bools
+    at_boundary: Bools
     falling: Ints = field(init=False)
     touched: list["_Touched"] = field(default_factory=list)
 
@@ -132,6 +137,14 @@ class _Touched:
     gone: Ints
     mixed: Ints  # those in several collapses, as places in the arrays above
 
+    def take(self, faces: Ints) -> "_Touched":
+        """Return some of the faces, all of them mixed."""
+        return _Touched(self.face.take(faces), self.corner.take(faces, axis=1), self.label.take(faces, axis=1),
+                        self.gone.take(faces), np.arange(len(faces)))
+
+
+# of each corner that stays, its collapse and the next vertex; of those at a boundary, also the previous one
+_Links = tuple[Ints, Ints, Ints, Ints]
 
 def collapse_steps(points: Floats, faces: Ints, quadrics: Floats, boundary: Bools, locked: Bools | None, target: int,
                    rules: Rules, blocks: Blocks) -> Generator[int, None, CollapseRecord]:
@@ -164,7 +177,10 @@ def collapse_steps(points: Floats, faces: Ints, quadrics: Floats, boundary: Bool
     """
     rows = np.zeros((points.shape[1] + 1, 4))
     rows[:-1, :3] = points.T
-    state = _State(rules, blocks, rows, quadrics.copy(), faces.copy(), np.append(boundary, False), locked,
+    fans = boundary_fans(faces, np.append(boundary, False))
+    if (fans > 1).any():  # boundaries meet there: such vertices stay where they are
+        locked = (fans[:-1] > 1) if locked is None else locked | (fans[:-1] > 1)
+    state = _State(rules, blocks, rows, quadrics.copy(), faces.copy(), np.append(boundary, False), fans, locked,
                    faces.shape[1])
     history: list[tuple] = []
     faces_before = state.alive
@@ -301,7 +317,7 @@ def _place(state: _State, slot: Ints, cost: np.ndarray) -> _Batch:
     one, other = _ends(state.faces, slot)
     count = len(slot)
     batch = _Batch(one, other, slot, cost, np.empty((count, WIDTH)), np.zeros((count, 4)), np.zeros(count, bool),
-                   np.zeros(count, bool))
+                   np.zeros(count, bool), state.boundary.take(one) | state.boundary.take(other))
 
     def place(part: slice) -> None:
         one, other = batch.one[part], batch.other[part]
@@ -343,20 +359,21 @@ def _stays(state: _State, one: Ints, other: Ints) -> tuple[Bools, Bools]:
 def _test(state: _State, batch: _Batch) -> None:
     """Mark the collapses that would turn a face over or change the topology."""
     count = len(batch.one)
-    def test(part: slice) -> tuple[_Touched, Ints, Ints, tuple[Ints, Ints, Ints]]:
+    def test(part: slice) -> tuple[_Touched, Ints, Ints, _Links]:
         touched = _touched(state, part)
         falling = touched.gone.take(np.flatnonzero(touched.gone != _NONE))
-        return touched, falling, _flips(state, touched.corner, touched.label), _link_pairs(state, touched)
+        return touched, falling, _flips(state, touched), _links(state, batch, touched)
 
     tested = state.blocks.map(test, state.faces.shape[1], _BLOCK)
     batch.touched = [touched for touched, _, _, _ in tested]
     batch.falling = np.bincount(np.concatenate([falling for _, falling, _, _ in tested]), minlength=count)
-    if state.rules.guard:
-        _break_links(state, batch, [pairs for _, _, _, pairs in tested])
-    rejected = batch.bad.copy()
+    rejected = np.zeros(count, bool)
     for _, _, flipped, _ in tested:
         rejected[flipped] = True
-    _reject(state, batch, rejected)
+    if state.rules.guard:
+        rejected |= _broken(state, batch, [links for _, _, _, links in tested])
+    while rejected.any():
+        rejected = _reject(state, batch, rejected)
 
 
 def _touched(state: _State, part: slice) -> _Touched:
@@ -377,14 +394,30 @@ def _removers(label: Ints) -> Ints:
     return np.where(by_first, first, np.where(second == third, second, _NONE))
 
 
-def _flips(state: _State, corner: Ints, label: Ints) -> Ints:
-    """Return the collapses, the dearest of each face, that together turn a face too far."""
+def _flips(state: _State, touched: _Touched) -> Ints:
+    """Return the collapses that turn a face too far, each in the state that the cheaper ones leave."""
+    corner, label = touched.corner, touched.label
     old = _normals(state.before, corner)
-    new = _normals(state.after, corner)
+    flipped = np.flatnonzero(_turned(state, old, _normals(state.after, corner)))
+    found = [label.take(flipped, axis=1).max(axis=0, initial=-1)]
+    # faces of several collapses pass through states in between
+    last = label.take(touched.mixed, axis=1).max(axis=0, initial=-1)
+    for side in range(3):
+        own = label[side].take(touched.mixed)
+        between = np.flatnonzero((own >= 0) & (own < last) & (own < touched.gone.take(touched.mixed)))
+        face, own = touched.mixed.take(between), own.take(between)
+        moved = label.take(face, axis=1).view(np.uint64) <= own.view(np.uint64)
+        new = _normals(state.rows, corner.take(face, axis=1) + moved * len(state.points))
+        found.append(own[_turned(state, [axis.take(face) for axis in old], new)])
+    return np.concatenate(found)
+
+
+def _turned(state: _State, old: Components, new: Components) -> Bools:
     turn = old[0] * new[0] + old[1] * new[1] + old[2] * new[2]
-    lengths = (old[0] * old[0] + old[1] * old[1] + old[2] * old[2]) * (new[0] * new[0] + new[1] * new[1] + new[2] * new[2])
-    flipped = np.flatnonzero(turn * np.abs(turn) < np.float32(state.rules.flip**2) * lengths)
-    return label.take(flipped, axis=1).max(axis=0, initial=-1)
+    lengths = old[0] * old[0] + old[1] * old[1] + old[2] * old[2]
+    lengths *= new[0] * new[0] + new[1] * new[1] + new[2] * new[2]
+    least = state.rules.flip
+    return turn * np.abs(turn) < np.float32(least * abs(least)) * lengths
 
 
 def _normals(rows: np.ndarray, corner: Ints) -> tuple:
@@ -392,27 +425,45 @@ def _normals(rows: np.ndarray, corner: Ints) -> tuple:
     return cross((rows.take(corner[1], axis=0) - base).T, (rows.take(corner[2], axis=0) - base).T)
 
 
-def _link_pairs(state: _State, touched: _Touched) -> tuple[Ints, Ints, Ints]:
-    """Return, for each corner in a collapse of the faces that stay, its collapse and the two vertices across."""
-    corner = [state.survivor.take(row) for row in touched.corner]
-    stays = touched.gone == _NONE
-    pairs = []
+def _links(state: _State, batch: _Batch, touched: _Touched, among: Bools | None = None) -> _Links:
+    """Return the ring of each collapse when its turn comes: faces fallen and vertices gone before are not there.
+
+    `among`, (c + 1,) bool, False and then whether to look at each collapse, leaves out the others.
+    """
+    pairs, ends = [], []
     for side in range(3):
-        chosen = np.flatnonzero((touched.label[side] >= 0) & stays)
-        pairs.append((touched.label[side].take(chosen), corner[(side + 1) % 3].take(chosen),
-                      corner[(side + 2) % 3].take(chosen)))
-    own, following, preceding = (np.concatenate(rows) for rows in zip(*pairs, strict=True))
-    return own, following, preceding
+        own = touched.label[side]
+        turn = (own >= 0) & (own < touched.gone)
+        if among is not None:
+            turn &= among.take(own + 1, mode="clip")
+        chosen = np.flatnonzero(turn)
+        own = own.take(chosen)
+        pairs.append((own, _at_turn(state, touched, (side + 1) % 3, chosen, own)))
+        if state.open:
+            chosen = chosen.compress(batch.at_boundary.take(own))
+            own = touched.label[side].take(chosen)
+            ends.append((own, _at_turn(state, touched, (side + 2) % 3, chosen, own)))
+        else:
+            ends.append((own[:0], own[:0]))
+    own, following = (np.concatenate(rows) for rows in zip(*pairs, strict=True))
+    open_own, preceding = (np.concatenate(rows) for rows in zip(*ends, strict=True))
+    return own, following, open_own, preceding
 
 
-def _break_links(state: _State, batch: _Batch, pairs: list) -> None:
-    """Reject what breaks the link condition: around the merged vertex each ring vertex must come once."""
-    own, following, preceding = (np.concatenate(rows) for rows in zip(*pairs, strict=True))
+def _at_turn(state: _State, touched: _Touched, side: int, chosen: Ints, own: Ints) -> Ints:
+    """Return the corners of the chosen faces at one side, as the collapses before their own leave them."""
+    corner = touched.corner[side].take(chosen)
+    before = touched.label[side].take(chosen).view(np.uint64) < own.view(np.uint64)
+    return np.where(before, state.survivor.take(corner), corner)
+
+
+def _broken(state: _State, batch: _Batch, links: list[_Links]) -> Bools:
+    """Tell the collapses that break the link condition: around the merged vertex each ring vertex must come once."""
+    own, following, open_own, preceding = (np.concatenate(rows) for rows in zip(*links, strict=True))
     count = len(batch.one)
     faces_left = np.bincount(own, minlength=count)
-    both_on_boundary = state.boundary.take(batch.one) & state.boundary.take(batch.other)
-    closed = batch.falling > 1
-    batch.bad |= np.where(closed, (faces_left < 3) | both_on_boundary, faces_left < 1)
+    both = state.boundary.take(batch.one) & state.boundary.take(batch.other)
+    broken = (faces_left < np.where(batch.at_boundary, 1, 3)) | ((batch.falling > 1) & both)
     # two writers of one place are rare: only they are sorted
     place = following * 4 + (own & 3)
     numbers = np.arange(len(place))
@@ -421,13 +472,13 @@ def _break_links(state: _State, batch: _Batch, pairs: list) -> None:
     suspect = np.zeros(len(state.owner), bool)
     suspect[place.take(lost)] = True
     rivals = np.flatnonzero(suspect.take(place))
-    batch.bad[_repeated((own.take(rivals) << 32) | following.take(rivals)) >> 32] = True
-    # an open fan must stay open: its last vertex must not be its first
-    at_boundary = np.flatnonzero(~closed.take(own) & both_on_boundary.take(own))
-    own = own.take(at_boundary)
-    ring = np.concatenate(((own << 32) | following.take(at_boundary), (own << 32) | preceding.take(at_boundary)))
+    broken[_repeated((own.take(rivals) << 32) | following.take(rivals)) >> 32] = True
+    # open fans must stay open and apart: the last vertex of each is none of the others
+    opened = np.flatnonzero(batch.at_boundary.take(own))
+    ring = np.concatenate(((own.take(opened) << 32) | following.take(opened), (open_own << 32) | preceding))
     distinct = np.bincount(np.unique(ring) >> 32, minlength=count)
-    batch.bad |= (distinct > 0) & (distinct != faces_left + 1)
+    fans = state.fans.take(batch.one) + state.fans.take(batch.other) - (batch.falling == 1)
+    return broken | (batch.at_boundary & (distinct != faces_left + fans))
 
 
 def _repeated(keys: Ints) -> Ints:
@@ -444,18 +495,26 @@ def _withdraw(state: _State, batch: _Batch, out: Bools) -> None:
         state.survivor[end] = end
 
 
-def _reject(state: _State, batch: _Batch, rejected: Bools) -> None:
-    """Take collapses out of the batch, and test their faces again without them, until no more turn over."""
-    while rejected.any():
-        _withdraw(state, batch, rejected)
-        outcast = np.append(False, rejected)
-        rejected = np.zeros(len(batch.bad), bool)
-        for touched in batch.touched:
-            hit = outcast.take(touched.label.take(touched.mixed, axis=1) + 1, mode="clip").any(axis=0)
-            corner = touched.corner.take(touched.mixed[hit], axis=1)
-            label = state.label.take(corner)
-            left = np.flatnonzero((label >= 0).any(axis=0))
-            rejected[_flips(state, corner.take(left, axis=1), label.take(left, axis=1))] = True
+def _reject(state: _State, batch: _Batch, rejected: Bools) -> Bools:
+    """Take collapses out of the batch; return those that fail without them."""
+    _withdraw(state, batch, rejected)
+    outcast = np.append(False, rejected)
+    failed = np.zeros(len(rejected), bool)
+    beside = np.zeros(len(rejected) + 1, bool)
+    for touched in batch.touched:
+        hit = outcast.take(touched.label.take(touched.mixed, axis=1) + 1, mode="clip").any(axis=0)
+        face = touched.mixed.compress(hit)
+        label = state.label.take(touched.corner.take(face, axis=1))
+        touched.label[:, face] = label
+        touched.gone[face] = _removers(label)
+        left = face.take(np.flatnonzero((label >= 0).any(axis=0)))
+        failed[_flips(state, touched.take(left))] = True
+        beside[label[label >= 0] + 1] = True
+    if state.rules.guard and beside.any():
+        again = state.blocks.map(lambda block: _links(state, batch, batch.touched[block.start], beside),
+                                 len(batch.touched), 1)
+        failed |= _broken(state, batch, again) & beside[1:]
+    return failed & ~batch.bad
 
 
 def _collapse(state: _State, batch: _Batch, target: int) -> tuple | None:
@@ -475,12 +534,14 @@ def _collapse(state: _State, batch: _Batch, target: int) -> tuple | None:
         state.points[vertices] = places[part]
         state.before[vertices] = state.after.take(vertices, axis=0)
         state.boundary[vertices] |= state.boundary.take(gone[part])
+        state.fans[vertices] += state.fans.take(gone[part]) - (batch.falling.take(chosen[part]) == 1)
 
     state.blocks.map(carry_out, len(chosen), _BLOCK // 4)
     _update(state, batch)
     state.base.ravel()[failed] = np.inf
     state.label[kept], state.label[gone] = ~kept, ~gone
     if len(chosen) == 0:
+        _apply_factor(state)
         return None
     faces_left = state.alive - removed.take(chosen)
     state.dead += state.alive - int(faces_left[-1])

@@ -10,8 +10,9 @@ from .mesh import Bools, Ints
 def open_vertices(faces: Ints, count: int) -> Bools:
     """Find vertices with a side that no other face runs back along: at boundaries, odd and inconsistent edges.
 
-    Each face runs along its sides; where the surface is closed and wound consistently, as many sides run from a to b as
-    from b to a. Sums of hashed neighbours on either way tell the vertices where that fails, without a sort of the edges.
+    Each face runs along its sides; where the surface is closed and wound consistently, as many sides run from a to b
+    as from b to a.
+    Sums of hashed neighbours on either way tell the vertices where that fails, without a sort of the edges.
 
     Parameters
     ----------
@@ -56,6 +57,16 @@ def boundary_sides(faces: Ints, opened: Bools) -> Ints:
     return slots.take(np.sort(order[alone]))
 
 
+def boundary_fans(faces: Ints, opened: Bools) -> Ints:
+    """Return how many runs of faces around each vertex go from boundary to boundary, (n,) int64; manifold: 0 or 1.
+
+    Arguments as of `boundary_sides`.
+    """
+    sides = boundary_sides(faces, opened)
+    ends = np.concatenate((faces.ravel().take(sides), np.roll(faces, -1, axis=0).ravel().take(sides)))
+    return np.bincount(ends, minlength=len(opened)) // 2
+
+
 def orient(faces: Ints, count: int) -> Bools:
     """Find the faces to turn over so that neighbours run along their common edge in opposite ways.
 
@@ -68,7 +79,7 @@ def orient(faces: Ints, count: int) -> Bools:
     Returns
     -------
     ndarray, (m,) bool
-        Of each connected part the fewer faces are turned. On a surface with one side (Möbius) some edges stay as they are.
+        Of each connected part the fewer faces are turned. On a one-sided surface (Möbius) some edges stay as they are.
     """
     width = faces.shape[1]
     start, end = faces.ravel(), np.roll(faces, -1, axis=0).ravel()
@@ -80,20 +91,41 @@ def orient(faces: Ints, count: int) -> Bools:
     one, other = order.take(pairs), order.take(pairs + 1)
     against = (start.take(one) == start.take(other)).astype(np.int8)
     one, other = one % width, other % width
-    turned = np.full(width, -1, np.int8)
+    turned = _two_colours(width, one, other, against)
     part = components(width, one, other)
-    seeds = np.full(part.max(initial=-1) + 1, width)
-    np.minimum.at(seeds, part, np.arange(width))
-    turned[seeds] = 0
-    while len(one):  # each round settles the neighbours of the faces that are settled
-        known, beyond = turned.take(one), turned.take(other)
-        forth, back = (known >= 0) & (beyond < 0), (known < 0) & (beyond >= 0)
-        turned[other[forth]] = known[forth] ^ against[forth]
-        turned[one[back]] = beyond[back] ^ against[back]
-        left = np.flatnonzero((known < 0) & (beyond < 0))
-        one, other, against = one.take(left), other.take(left), against.take(left)
     most = np.bincount(part, turned) * 2 > np.bincount(part)
     return (turned == 1) ^ most.take(part)
+
+
+def _two_colours(count: int, one: Ints, other: Ints, differ: Ints) -> Ints:
+    """Give each node of a graph 0 or 1 so that the ends of links differ where they should, as far as that can be.
+
+    Like `components`: each root takes a lower root that it is linked to, and all paths are cut short.
+    """
+    root, colour = np.arange(count), np.zeros(count, np.int8)
+    while True:
+        low, high = root.take(one), root.take(other)
+        apart = np.flatnonzero(low != high)
+        if len(apart) == 0:
+            return colour
+        one, other, differ = one.take(apart), other.take(apart), differ.take(apart)
+        low, high = low.take(apart), high.take(apart)
+        turn = differ ^ colour.take(one) ^ colour.take(other)
+        low, high = np.minimum(low, high), np.maximum(low, high)
+        chosen = np.full(count, len(one))
+        np.minimum.at(chosen, high, np.arange(len(one)))
+        taken = np.flatnonzero(chosen < len(one))
+        link = chosen.take(taken)
+        above, relative = np.arange(count), np.zeros(count, np.int8)
+        above[taken], relative[taken] = low.take(link), turn.take(link)
+        while True:
+            further = above.take(above)
+            if np.array_equal(further, above):
+                break
+            relative ^= relative.take(above)
+            above = further
+        colour ^= relative.take(root)
+        root = above.take(root)
 
 
 def winding_conflicts(faces: Ints, opened: Bools) -> bool:

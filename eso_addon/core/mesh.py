@@ -154,11 +154,13 @@ def _morton_sorted(points: Floats) -> tuple[Ints, Ints]:
     index_bits = max(len(points) - 1, 1).bit_length()
     axis_bits = min((63 - index_bits) // 3, 16)
     low = points.min(axis=0)
-    extent = float((points.max(axis=0) - low).max())
-    scale = (2**axis_bits - 1) / extent if extent > 0 else 0.0
+    with np.errstate(over="ignore"):
+        extent = float((points.max(axis=0) - low).max())
+    # an extent beyond the largest number or next to none gives no order, and no harm
+    scale = (2**axis_bits - 1) / extent if 1e-290 < extent < np.inf else 0.0
     keys = np.zeros(len(points), np.int64)
     for axis in range(3):
-        cell = ((points[:, axis] - low[axis]) * scale).astype(np.int64)
+        cell = ((points[:, axis] - low[axis]) * scale).astype(np.int64) if scale else np.zeros(len(points), np.int64)
         keys |= _spread(cell) << axis
     keys <<= index_bits
     keys |= np.arange(len(points))

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A mesh made ready for the engine: mended, welded, wound one way, in Morton order, about the origin and of unit size."""
+"""A mesh made ready for the engine: mended, welded, wound one way, in Morton order, of unit size about the origin."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
 from .adjacency import vertex_components
-from .manifold import open_vertices, orient, winding_conflicts
+from .manifold import boundary_sides, open_vertices, orient, winding_conflicts
 from .mesh import Bools, Floats, Ints, MeshError, morton_order, morton_weld
 
 
@@ -20,6 +20,8 @@ class Prepared:
     faces : ndarray, (3, m) int64
     opened : ndarray, (n,) bool
         Vertices at a boundary or at an edge that is not manifold.
+    boundary : ndarray, (b,) int64
+        Sides without another face, as slots j * m + face.
     center, size
         An engine's position times `size`, plus `center`, is the input's.
     source : ndarray, (n,) int64
@@ -39,6 +41,7 @@ class Prepared:
     points: Floats
     faces: Ints
     opened: Bools
+    boundary: Ints
     center: Floats
     size: float
     source: Ints
@@ -95,21 +98,24 @@ def prepare(vertices: Floats, faces: Ints, *, join: bool = True, prune: float = 
         turned = orient(corners, len(source))
         corners[1:, turned] = corners[:0:-1, turned]
         opened = open_vertices(corners, len(source))
+    boundary = boundary_sides(corners, opened)
     placed = vertices.take(source, axis=0)
     low, high = placed.min(axis=0), placed.max(axis=0)
-    center = low + (high - low) / 2
-    extent = float((high - low).max())
+    with np.errstate(over="ignore"):
+        extent = float((high - low).max())
+        center = low + (high - low) / 2
     if not np.isfinite(extent):
         raise MeshError("coordinates are too large: scale the mesh down first")
     size = extent * float(np.linalg.norm((high - low) / extent))
     points = np.ascontiguousarray(((placed - center) / size).T)
     joined = len(source) < np.count_nonzero(vertex >= 0)
     split = vertex_components(faces.take(kept, axis=0), len(vertices)) if joined else None
-    return Prepared(points, corners, opened, center, size, source, vertex, split, kept, turned, tuple(messages))
+    return Prepared(points, corners, opened, boundary, center, size, source, vertex, split, kept, turned,
+                    tuple(messages))
 
 
 def _numbers(vertices: Floats, faces: Ints, join: bool) -> tuple[Ints, Ints]:
-    """Number the positions that faces use along a Morton curve: of each vertex, -1 if unused, and a vertex of each."""
+    """Return the number of each vertex's position along a Morton curve, -1 if unused, and a vertex at each position."""
     used = np.zeros(len(vertices), bool)
     used[faces] = True
     some = None if used.all() else np.flatnonzero(used)
@@ -126,7 +132,7 @@ def _numbers(vertices: Floats, faces: Ints, join: bool) -> tuple[Ints, Ints]:
 
 
 def _distinct(faces: Ints) -> Ints:
-    """Return the faces, of (3, m), with three different corners that do not repeat an earlier one the same way round."""
+    """Return the (3, m) faces with three different corners that do not repeat an earlier one the same way round."""
     a, b, c = faces
     proper = (a != b) & (b != c) & (c != a)
     # of faces with the same corners the sums are the same: few others are left to compare whole

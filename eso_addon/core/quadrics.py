@@ -1,14 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Quadric error metrics (Garland and Heckbert; paper one, Equations 1 to 3 and 9) for arrays of vertices and edges.
 
-A quadric is a row of ten numbers, `a11 a12 a13 a22 a23 a33 b1 b2 b3 c`: the error at x is xᵀAx + 2bᵀx + c. Rows have two
-spare columns: a gather of 96 bytes is faster than one of 80.
+A quadric is a row of ten numbers, `a11 a12 a13 a22 a23 a33 b1 b2 b3 c`: the error at x is xᵀAx + 2bᵀx + c. Rows have
+two spare columns: a gather of 96 bytes is faster than one of 80.
 """
+
+from collections.abc import Sequence
 
 import numpy as np
 
 from .mesh import Floats, Ints
 
+# rows of a matrix, or a list of them
+Components = np.ndarray | Sequence[np.ndarray]
 WIDTH = 12
 _PAIRS = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 _DIAGONAL = (0, 3, 5)
@@ -54,7 +58,7 @@ def area_normals(points: Floats, faces: Ints) -> tuple[Floats, Floats]:
     return normals, np.sqrt((normals * normals).sum(axis=0))
 
 
-def cross(a, b):  # noqa: ANN001, ANN201 - any three components of one length
+def cross(a: Components, b: Components) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Cross product by components: a, b and the result are triples of arrays."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
@@ -86,8 +90,8 @@ def boundary_quadrics(points: Floats, normals: Floats, edges: Ints, weight: floa
 def anchored(parts: Floats, points: Floats, memory: float) -> Floats:
     """Turn 3 by 3 parts about each vertex into quadrics, with a faint memory of where the vertex stands.
 
-    The memory, `memory` times the trace times the squared distance from the vertex, makes every system solvable and lets
-    a flat region collapse its short edges first instead of in random order.
+    The memory, `memory` times the trace times the squared distance from the vertex, makes every system solvable and
+    lets a flat region collapse its short edges first instead of in random order.
 
     Parameters
     ----------
@@ -138,7 +142,7 @@ def move_memory(merged: Floats, one: Floats, other: Floats, starts: Floats, ends
                      - pull_other * (ends * ends).sum(axis=0))
 
 
-def _eliminate(q):  # noqa: ANN001, ANN202 - ten columns of one length
+def _eliminate(q: np.ndarray) -> tuple[np.ndarray, ...]:
     """LDLᵀ of A with the pivots' inverses, and the forward substitution of b: stable where Cramer's rule is not."""
     a11, a12, a13, a22, a23, a33, b1, b2, b3, _ = q
     r1 = 1.0 / a11

@@ -276,7 +276,7 @@ def _solve(vertices: Floats, faces: Ints, samples: _Samples, face: Ints, places:
 
 
 def _tilts(vertices: Floats, faces: Ints, samples: _Samples, face: Ints) -> Floats:
-    """Return the (3, 3, m) sums of the outer products of the normals of each face's samples, where they agree with it."""
+    """Return (3, 3, m): outer products of the normals of each face's samples, where they agree with it, summed."""
     normals = samples.normals
     own = np.ascontiguousarray(face_normals(vertices, faces).T)
     weights = np.where((own.take(face, axis=1) * normals).sum(axis=0) > _AGREE, _TILT * samples.weights, 0)

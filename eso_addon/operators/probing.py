@@ -4,7 +4,7 @@
 from collections.abc import Generator
 from typing import TypeVar
 
-from ..core.simplify import SimplifyResult
+from ..core.levels import SimplifyResult
 
 Results = TypeVar("Results", SimplifyResult, list[SimplifyResult])
 

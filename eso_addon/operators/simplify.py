@@ -7,7 +7,8 @@ from ..bridge import objects
 from ..bridge.read_mesh import MeshArrays, read_mesh
 from ..bridge.write_mesh import write_mesh
 from ..core.mesh import MeshError
-from ..core.simplify import SimplifyResult, simplify_steps
+from ..core.levels import SimplifyResult
+from ..core.simplify import simplify_steps
 from ..jobs.modal import EngineOperator
 from ..jobs.worker import Steps
 from ..settings.options import SimplifyOptions

@@ -104,7 +104,6 @@ def test_nothing_to_simplify(faces: Ints) -> None:
         prepare(np.array([[0, 0, 0], [1, 0, 0], [0, 0, 0]], float), faces)
 
 
-@pytest.mark.xfail(reason="numpy warns of the overflow before the error is raised", raises=RuntimeWarning)
 def test_coordinates_too_large() -> None:
     vertices, faces = shapes.ball(1)
     with pytest.raises(MeshError, match="scale the mesh down"):

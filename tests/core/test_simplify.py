@@ -221,12 +221,12 @@ def outline(vertices: Floats, faces: Ints) -> float:
     return float(np.linalg.norm(vertices[start] - vertices[end], axis=1).sum())
 
 
-@pytest.mark.xfail(reason="three faces must be left even where an inner vertex goes into a boundary vertex")
 def test_a_flat_square_becomes_its_two_triangles() -> None:
     vertices, faces = shapes.sheet(20, 20, np.random.default_rng(0))
     result = simplify(vertices, faces, faces_target=2)
     assert result.reached
-    assert_allclose(result.vertices[np.lexsort(result.vertices.T)], [[0, 0, 0], [20, 0, 0], [0, 20, 0], [20, 20, 0]],
+    corners = np.round(result.vertices, 3)
+    assert_allclose(corners[np.lexsort(corners.T)], [[0, 0, 0], [20, 0, 0], [0, 20, 0], [20, 20, 0]],
                     atol=1e-3)
 
 

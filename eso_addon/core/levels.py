@@ -1,0 +1,166 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""From the engine's record to finished meshes: a level in the input's numbers, refitted, and the level for an error."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .closest import ClosestPoints
+from .deviation import measure
+from .mesh import Floats, Ints
+from .options import Options
+from .prepare import Prepared
+from .record import CollapseRecord
+from .refit import refit
+
+Int32s = NDArray[np.int32]
+Mesh = tuple[Floats, Ints]
+
+# points on each surface where levels are compared
+_PROBES = 8192
+# a maximum error is sought with probes until this part of it is used; more of them may find a little more
+_MARGIN = 0.9
+_ENOUGH = 0.75
+
+
+@dataclass(frozen=True)
+class SimplifyResult:
+    """A simplified mesh.
+
+    Attributes
+    ----------
+    vertices : ndarray, (k, 3) float64
+    faces : ndarray, (m, 3) int32
+    vertex_map : ndarray, (n,) int32
+        The vertex that each input vertex has become, -1 if it is gone.
+    face_map : ndarray, (m,) int32
+        The input face that each face comes from.
+    reached : bool
+        Whether the target was reached.
+    messages : tuple of str
+        What was mended, and why a target was not reached.
+    record : CollapseRecord
+        The run that made it, in the engine's numbers.
+    """
+
+    vertices: Floats
+    faces: Int32s
+    vertex_map: Int32s
+    face_map: Int32s
+    reached: bool
+    messages: tuple[str, ...]
+    record: CollapseRecord
+    original: Mesh
+
+    @cached_property
+    def error(self) -> float:
+        """Largest distance between both surfaces at thousands of probes, in the mesh's units; `measure` takes more."""
+        return _Probes(self.original).deviation(self)
+
+
+def in_input_units(record: CollapseRecord, mesh: Prepared, vertices: Floats) -> CollapseRecord:
+    """Return the record with positions in the input's units; vertices that stayed have theirs to the last bit."""
+    position = record.position * mesh.size + mesh.center
+    still = record.stays
+    position[still] = vertices[mesh.source[record.kept[still]]]
+    return replace(record, position=position)
+
+
+def level(mesh: Prepared, record: CollapseRecord, original: Mesh, length: int,
+           options: Options) -> SimplifyResult:
+    """Build the mesh after so many collapses, refitted, in the input's numbers."""
+    vertices, faces = original
+    points, corners, face_map, survivor = record.level(vertices[mesh.source], mesh.faces.T, length)
+    if mesh.turned is not None:
+        turned = mesh.turned[face_map]
+        corners[turned, 1:] = corners[turned, :0:-1]
+    used = np.zeros(len(points), bool)
+    used[corners] = True
+    alive = np.flatnonzero(used)
+    number = np.full(len(points), -1)
+    number[alive] = np.arange(len(alive))
+    corners, placed = number.take(corners), points.take(alive, axis=0)
+    merged = number.take(survivor)  # of the engine's vertices
+    vertex_map = np.where(mesh.vertex >= 0, merged.take(mesh.vertex, mode="clip"), -1)
+    if options.refit and options.placement == "optimal" and length:
+        # the engine's vertices stand for the input's, so that seams stay closed
+        placed = refit(placed, corners, vertices[mesh.source], mesh.faces.T, vertex_map=merged)
+    face_map = mesh.face[face_map]
+    if mesh.sheet is not None:
+        placed, corners, vertex_map = _split(mesh.sheet, faces[face_map], placed, corners, vertex_map)
+    return SimplifyResult(placed, corners.astype(np.int32), vertex_map.astype(np.int32), face_map.astype(np.int32),
+                          True, mesh.messages, record, original)
+
+
+def _split(sheet: Ints, input_corners: Ints, points: Floats, corners: Ints,
+           vertex_map: Ints) -> tuple[Floats, Ints, Ints]:
+    """Give each connected part of the input its own vertices again where the weld had joined them."""
+    count = int(sheet.max(initial=0)) + 1
+    keys, numbers = np.unique((corners * count + sheet.take(input_corners)).ravel(), return_inverse=True)
+    wanted = vertex_map * count + sheet
+    found = np.searchsorted(keys, wanted).clip(max=len(keys) - 1)
+    there = (vertex_map >= 0) & (keys[found] == wanted)
+    return points.take(keys // count, axis=0), numbers.reshape(corners.shape), np.where(there, found, -1)
+
+
+def judge_count(result: SimplifyResult, target: int) -> SimplifyResult:
+    """Return the result, saying so where it stopped short of its target."""
+    left = len(result.faces)
+    if left <= target:
+        return result
+    message = (f"stopped at {left} of {target} triangles: no further edge can go without changing the topology; "
+               "prune small parts to go on")
+    return replace(result, reached=False, messages=(*result.messages, message))
+
+
+def within(mesh: Prepared, record: CollapseRecord, original: Mesh, limit: float,
+            options: Options) -> SimplifyResult:
+    """Find a long prefix of the record whose measured deviation stays within a limit.
+
+    The costs are no distances, so the deviation is measured: with probes while the prefix is sought, and at the end as
+    `measure` does it.
+    """
+    plain = replace(options, refit=False)
+    probes = _Probes(original)
+    low, high = 0, len(record)
+    while low < high:
+        middle = (low + high + 1) // 2
+        deviation = probes.deviation(level(mesh, record, original, middle, plain))
+        if deviation > _MARGIN * limit:
+            high = middle - 1
+            continue
+        low = middle
+        if deviation > _ENOUGH * limit:
+            break
+    while low:
+        for chosen in (options, plain) if options.refit else (plain,):
+            result = level(mesh, record, original, low, chosen)
+            if measure(*original, result.vertices, result.faces).symmetric.maximum <= limit:
+                return result
+        low = max(low - (mesh.faces.shape[1] - low) // 20 - 1, 0)
+    return level(mesh, record, original, 0, plain)
+
+
+class _Probes:
+    """Points spread over an original, to bound the deviation of many levels quickly."""
+
+    def __init__(self, original: Mesh) -> None:
+        vertices, faces = original
+        self.surface = ClosestPoints(vertices, faces)
+        self.points = _thin(np.concatenate((vertices[np.unique(faces)], vertices[faces].mean(axis=1))))
+
+    def deviation(self, level: SimplifyResult) -> float:
+        corners = level.vertices[level.faces]
+        middles = (corners + np.roll(corners, 1, axis=1)).reshape(-1, 3) / 2
+        points = _thin(np.concatenate((level.vertices, corners.mean(axis=1), middles)))
+        _, _, forward = ClosestPoints(level.vertices, level.faces.astype(np.int64)).query(self.points)
+        _, _, backward = self.surface.query(points)
+        return float(np.sqrt(max(forward.max(initial=0.0), backward.max(initial=0.0))))
+
+
+def _thin(points: Floats) -> Floats:
+    return points[:: -(-len(points) // _PROBES) or 1]

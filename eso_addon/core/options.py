@@ -1,0 +1,133 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a user may ask of the simplifier: options, presets and targets, checked."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from .collapse import Rules
+from .mesh import MeshError
+from .variation import METHODS
+
+
+@dataclass(frozen=True)
+class Options:
+    """How to simplify; the defaults are the best that was measured.
+
+    Attributes
+    ----------
+    method : str
+        Vertex weights: "eso" (Equation 8), "so" (Equation 7), "qem" (none), or "cf" (edge factor of Equation 5).
+    rings : int
+        Rings of "eso".
+    placement : str
+        "optimal", or "endpoint": half-edge collapse, survivors stay where they are.
+    weight_power : float
+        The weights enter the quadrics raised to this power.
+    area_weighted : bool
+        Weigh planes by their faces' areas; without it by one, as printed.
+    boundary_weight : float
+        Weight of the quadrics that hold open boundaries.
+    memory, flip, share, spread, guard
+        See `collapse.Rules`.
+    weld : bool
+        Treat vertices at equal positions as one, and hand them back split.
+    prune : float
+        Drop connected parts whose bounding box has a smaller diagonal, in the mesh's units.
+    refit : bool
+        Move the survivors afterwards so that the surface fits the original; only with optimal placement.
+    threads : int, optional
+        All processors, at most four, where not given. The result does not depend on it.
+    """
+
+    method: str = "eso"
+    rings: int = 3
+    placement: str = "optimal"
+    weight_power: float = 0.5
+    area_weighted: bool = True
+    boundary_weight: float = 10.0
+    memory: float = 1e-9
+    flip: float = 0.5
+    share: float = 0.5
+    spread: float = 3.0
+    guard: bool = True
+    weld: bool = True
+    prune: float = 0.0
+    refit: bool = True
+    threads: int | None = None
+
+    def __post_init__(self) -> None:
+        if self.method not in METHODS:
+            raise MeshError(f"unknown method {self.method!r}: choose one of {', '.join(METHODS)}")
+        if self.placement not in ("optimal", "endpoint"):
+            raise MeshError(f"unknown placement {self.placement!r}: choose optimal or endpoint")
+        number("rings", self.rings, 1, 1000, whole=True)
+        number("weight_power", self.weight_power, 0, 4)
+        number("boundary_weight", self.boundary_weight, 0, 1e6)
+        # less than this is lost in rounding, and flat regions could not be solved
+        number("memory", self.memory, 1e-12, 1)
+        number("flip", self.flip, -1, 1)
+        number("share", self.share, 1e-6, 1)
+        number("spread", self.spread, 1, np.inf)
+        number("prune", self.prune, 0, np.inf)
+        if self.threads is not None:
+            number("threads", self.threads, 1, 1024, whole=True)
+
+    @property
+    def rules(self) -> Rules:
+        """What these options let the engine do."""
+        return Rules(self.placement == "endpoint", self.memory, self.flip, self.guard, self.share, self.spread,
+                     self.method == "cf")
+
+
+# the equations as printed: planes of weight one, weights once and to the first power, nothing held, edges only
+PRESETS: dict[str, dict[str, Any]] = {
+    "default": {},
+    "paper": {"weight_power": 1.0, "area_weighted": False, "boundary_weight": 0.0, "memory": 1e-9, "flip": 0.2,
+              "share": 0.05,
+              "guard": False, "refit": False},
+}
+
+
+def number(name: str, value: Any, low: float, high: float, *, whole: bool = False) -> float:  # noqa: ANN401
+    """Return a value as a number between two bounds, or raise MeshError."""
+    kind = "a whole number" if whole else "a number"
+    bounds = f"of at least {low:g}" if high > 1e15 else f"from {low:g} to {high:g}"
+    try:
+        given = float(value)
+    except (TypeError, ValueError):
+        given = np.nan
+    if not low <= given <= high or (whole and given != int(given)):
+        raise MeshError(f"{name} is {value}: give {kind} {bounds}")
+    return given
+
+
+def options_of(preset: str, chosen: dict[str, Any]) -> Options:
+    """Return a preset's options with some replaced."""
+    if preset not in PRESETS:
+        raise MeshError(f"unknown preset {preset!r}: choose one of {', '.join(PRESETS)}")
+    unknown = sorted(set(chosen) - set(Options.__dataclass_fields__))
+    if unknown:
+        raise MeshError(f"unknown option {unknown[0]!r}: choose from {', '.join(Options.__dataclass_fields__)}")
+    return Options(**{**PRESETS[preset], **chosen})
+
+
+def targets_of(face_count: int, ratios: Sequence[float] | None, faces_targets: Sequence[int] | None,
+               max_errors: Sequence[float] | None) -> tuple[list[int], list[float]]:
+    """Return targets of one kind: as counts of faces, or as errors."""
+    given = [kind for kind in (ratios, faces_targets, max_errors) if kind is not None]
+    if len(given) != 1 or len(given[0]) == 0:
+        raise MeshError("give one target: ratio, faces_target or max_error")
+    if ratios is not None:
+        for ratio in ratios:
+            if not isinstance(ratio, int | float | np.number) or not 0 < ratio <= 1:
+                raise MeshError(f"ratio is {ratio}: give a number above 0 and at most 1")
+        return [max(round(face_count * float(ratio)), 1) for ratio in ratios], []
+    if faces_targets is not None:
+        return [int(number("faces_target", count, 1, 2.0**53, whole=True)) for count in faces_targets], []
+    assert max_errors is not None
+    return [], [number("max_error", error, 0, 1e300) for error in max_errors]

@@ -1,0 +1,42 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the engine starts from: the quadric of each vertex, weighted as the options ask."""
+
+import numpy as np
+
+from .blocks import Blocks
+from .mesh import Floats
+from .options import Options
+from .prepare import Prepared
+from .quadrics import anchored, area_normals, boundary_quadrics, plane_quadrics
+from .variation import surface_variation
+
+
+def initial_quadrics(mesh: Prepared, options: Options, blocks: Blocks) -> Floats:
+    """Weigh the mesh: Equation 9, and the planes that hold boundaries.
+
+    Parameters
+    ----------
+    mesh : Prepared
+    options : Options
+    blocks : Blocks
+
+    Returns
+    -------
+    ndarray, (n, 12) float64
+        See `quadrics`.
+    """
+    parts = plane_quadrics(mesh.points, mesh.faces, area_weighted=options.area_weighted)
+    if options.boundary_weight > 0 and len(mesh.boundary):
+        sides = mesh.boundary
+        normals, areas = area_normals(mesh.points, mesh.faces)
+        face = sides % mesh.faces.shape[1]
+        edges = np.stack((mesh.faces.ravel().take(sides), np.roll(mesh.faces, -1, axis=0).ravel().take(sides)))
+        parts += boundary_quadrics(mesh.points, normals.take(face, axis=1) / np.maximum(areas.take(face), 1e-300),
+                                   edges, options.boundary_weight)
+    if options.method in ("so", "eso"):
+        rings = 1 if options.method == "so" else int(options.rings)
+        weights = surface_variation(mesh.points.T, mesh.faces.T, rings, blocks)
+        mean = weights.mean()
+        if mean > 0:
+            parts *= np.maximum(weights / mean, 1e-6) ** options.weight_power
+    return anchored(parts, mesh.points, options.memory)
