@@ -70,7 +70,7 @@ class Connectivity:
     def __init__(self) -> None:
         self.flag = Model(64, 2)
         self.length = Model(16, 16)
-        self.start = Model(64, 16)
+        self.start = Model(128, 16)
         self.sides = Model(3, 4)
         self.torn = Model(2, 2)
 
@@ -98,12 +98,16 @@ def code_batch(coder: Writer | Reader, models: Connectivity, shape: Shape, mesh:
     moved.ravel()[slot] = new.take(arcs.split)
     found = openings(fans, arcs, vertex, start, there, moved, count)
     third = found.third
-    at = np.flatnonzero(found.torn.ravel())
+    at, partner = found.torn_at, found.partner
     if len(at):
-        upper = None if known is None else (known.third.ravel().take(at) >= count).astype(np.int64)
-        upper = coder.symbols(models.torn, at // splits, upper)
+        first = np.flatnonzero(np.arange(len(at)) <= partner)
+        diagonal = np.zeros(len(at), bool)
+        if known is not None:
+            diagonal = found.upper_of(known.third.ravel().take(at) >= count)
+        diagonal[first] = coder.symbols(models.torn, first * 0, diagonal.take(first).astype(np.int64)) == 1
+        diagonal = diagonal.take(np.minimum(partner, np.arange(len(at))))
         ring = label.take(third.ravel().take(at))
-        third.ravel()[at] = np.where(upper == 1, new.take(ring), third.ravel().take(at))
+        third.ravel()[at] = np.where(found.upper_of(diagonal), new.take(ring), third.ravel().take(at))
     numbers = code_positions(coder, shape, mesh.grid, mesh.points[:count], fans, arcs, vertex,
                              None if known is None else known.numbers)
     _carry_out(mesh, moved, vertex, there, third, numbers)
@@ -161,7 +165,7 @@ def _code_start(coder: Writer | Reader, model: Model, mesh: Mesh, fans: Fans, ow
     order = np.lexsort((fans.slot, -window, own))
     begin = np.cumsum(degree) - degree
     rank = None
-    context = np.minimum(degree, 15)
+    context = np.minimum(degree, 15) * 8 + np.minimum(length, 7)
     if known is not None:
         place = np.full(3 * mesh.face_count, -1)
         place[fans.slot] = np.arange(corners)

@@ -106,7 +106,7 @@ def code_positions(coder: Writer | Reader, shape: Shape, grid: Grid, points: Int
     """Write or read the numbers of the new vertices' coordinates: (k, 3) int64.
 
     The two coordinates across the surface's normal come first, against the mean of the ring; the one along it last,
-    against the plane of the arc through that mean, where the first two put it.
+    against the plane of the arc through the old vertex, where the first two put it.
     """
     total, size = ring_sums(points, fans, arcs, vertex)
     mean = (2 * total + size) // (2 * size)
@@ -130,11 +130,11 @@ def code_positions(coder: Writer | Reader, shape: Shape, grid: Grid, points: Int
             lean = sum(normal[(axis + 1 + i) % 3, columns] * moved[i] for i in range(2))
             divisor = normal[axis, columns]
             divisor = np.where(divisor == 0, 1, divisor)
-            expected = expected - lean // divisor
+            expected = points.take(vertex, axis=0)[columns, at] - lean // divisor
         number, place = _code_one(coder, model, grid, expected, scale, None if known is None else known[columns, at])
         values[columns, at] = number
-        moved.append(place - mean[at, columns])
-        scale = (spread + 3 * np.abs(moved[-1]) + 1) >> 1
+        moved.append(place - points.take(vertex, axis=0)[columns, at])
+        scale = (spread + 3 * np.abs(place - mean[at, columns]) + 1) >> 1
     return values
 
 

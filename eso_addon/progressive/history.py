@@ -222,6 +222,10 @@ class _Attempt:
         found = openings(fans, arcs, self.old, self.start, there, faces, len(self.mesh.points))
         wrong = there & np.where(found.torn, self.mesh._goes.take(self.third) != found.third,
                                  self.third != found.third)
+        at, other = found.torn_at, found.partner
+        diagonal = found.upper_of(self.third.ravel().take(at) != self.mesh._goes.take(self.third.ravel().take(at)))
+        apart = at[(diagonal != diagonal.take(other)) | (other.take(other) != np.arange(len(at)))]
+        wrong.ravel()[apart] = True
         self.bad |= wrong.any(axis=0)
 
     def accept(self) -> Batch:

@@ -45,6 +45,6 @@ class Model:
         """Count what a batch held."""
         contexts, symbols = self.counts.shape
         new = np.bincount(context * symbols + symbol, minlength=contexts * symbols).reshape(contexts, symbols)
-        self.counts = (self.counts >> 1) + new if int(self.counts.max()) > _LIMIT else self.counts + new
+        self.counts = (self.counts >> 1) + new if int(self.counts.max()) > _LIMIT else (self.counts >> 1) + new
         if self.shared is not None:
             self.shared += np.bincount(symbol - context + contexts, minlength=contexts + symbols)

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Generator
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -17,6 +16,9 @@ from .history import Batch, Unwinding
 from .source import Source
 
 _ROUNDS = 12
+# collapses are looked at for one batch until they are this part of the vertices: above half of them, and below,
+# where what is cheap should go first
+_SHARES = (0.5, 0.2)
 
 
 @dataclass
@@ -114,15 +116,42 @@ def make_patches(source: Source, target: int, options: dict[str, Any]) -> Genera
             except StopIteration as end:
                 record = end.value
                 break
-        for first, last in pairwise([*record.batch_starts, len(record)]):
-            batch = unwinding.collapse(mesh.source.take(record.removed[first:last]),
-                                       mesh.source.take(record.kept[first:last]))
+        removed, kept = mesh.source.take(record.removed), mesh.source.take(record.kept)
+        vertices = int(np.count_nonzero(np.bincount(unwinding.faces.ravel())))
+        for chosen_now in _regrouped(removed, kept, record.batch_starts, vertices, len(points)):
+            batch = unwinding.collapse(removed[chosen_now], kept[chosen_now])
             if batch is not None:
                 batches.append(batch)
         if int(unwinding.held.sum()) == held:
             break
         unwinding.frozen[:] = False
     return _Numbering(source, unwinding, faces, batches[::-1], corner).patches()
+
+
+def _regrouped(removed: Ints, kept: Ints, starts: Ints, vertices: int, count: int) -> Generator[Ints, None, None]:
+    """Give the record's collapses in fewer and larger batches: a batch has one flag a vertex, however many split.
+
+    Collapses without a common vertex may change places: their splits do not depend on each other.
+    """
+    ends = np.append(starts[1:], len(removed))[: len(starts)]
+    total = vertices
+    first = np.full(count, count)
+    waiting = np.zeros(0, np.int64)
+    taken = 0
+    while taken < len(ends) or len(waiting):
+        share = _SHARES[vertices * 2 < total]
+        while taken < len(ends) and len(waiting) <= share * vertices:
+            waiting = np.concatenate((waiting, np.arange(starts[taken], ends[taken])))
+            taken += 1
+        one, other = removed.take(waiting), kept.take(waiting)
+        place = np.arange(len(waiting))
+        np.minimum.at(first, one, place)
+        np.minimum.at(first, other, place)
+        free = (first.take(one) == place) & (first.take(other) == place)
+        first[one], first[other] = count, count
+        yield waiting[free]
+        vertices -= int(free.sum())
+        waiting = waiting[~free]
 
 
 def _corner_columns(turned: np.ndarray | None, width: int) -> Ints:

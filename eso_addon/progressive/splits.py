@@ -80,12 +80,26 @@ class Openings:
     third : ndarray, (2, k) int64
         In the mesh after the batch, except where `torn`: there it is the vertex before the batch, or its new one.
     torn : ndarray, (2, k) bool
-        The edge at which the face opens is opened from its other end too.
+        The edge at which the face opens is opened from its other end too: a quad opens, cut by one of two diagonals.
+    torn_at : ndarray, (t,) int64
+        Where `torn` is true in the raveled array.
+    partner : ndarray, (t,) int64
+        The place in `torn_at` of the opening at the edge's other end.
     """
 
     there: Bools
     third: Ints
     torn: Bools
+    torn_at: Ints
+    partner: Ints
+
+    def upper_of(self, diagonal: Bools) -> Bools:
+        """Tell which third corners are the new vertices of their splits; for which diagonal, and the other way.
+
+        `diagonal` is (t,) bool: the third corner is the one of the face that runs from the own vertex to the ring's.
+        Both openings at an edge have the same.
+        """
+        return diagonal == (self.torn_at.take(self.partner) >= self.there.shape[1])
 
 
 def openings(fans: Fans, arcs: Arcs, vertex: Ints, start: Ints, there: Bools, faces: Ints, count: int) -> Openings:
@@ -103,11 +117,18 @@ def openings(fans: Fans, arcs: Arcs, vertex: Ints, start: Ints, there: Bools, fa
         Number of vertices before the batch.
     """
     ring = np.stack((arcs.first_ring, arcs.last_ring))
-    keys = vertex * count + ring
-    cut = np.sort(keys[there])
-    back = ring * count + vertex
-    place = np.searchsorted(cut, back).clip(max=max(len(cut) - 1, 0))
-    torn = there & (cut.take(place) == back) if len(cut) else there & False
+    keys = (vertex * count + ring).ravel()
+    cuts = np.flatnonzero(there.ravel())
+    cuts = cuts.take(np.argsort(keys.take(cuts), kind="stable"))
+    sorted_keys = keys.take(cuts)
+    back = (ring * count + vertex).ravel()
+    place = np.searchsorted(sorted_keys, back).clip(max=max(len(cuts) - 1, 0))
+    torn = (there.ravel() & (sorted_keys.take(place) == back)) if len(cuts) else np.zeros(there.size, bool)
+    torn_at = np.flatnonzero(torn)
+    number = np.zeros(there.size, np.int64)
+    number[torn_at] = np.arange(len(torn_at))
+    partner = number.take(cuts.take(place.take(torn_at)))
+    torn = torn.reshape(there.shape)
     width = faces.shape[1]
     flat = faces.ravel()
     size = len(flat)
@@ -116,4 +137,4 @@ def openings(fans: Fans, arcs: Arcs, vertex: Ints, start: Ints, there: Bools, fa
     first = flat.take((fans.slot.take(start) + width) % max(size, 1)) if size else ring[0]
     last = flat.take((fans.slot.take(arcs.last) + 2 * width) % max(size, 1)) if size else ring[1]
     third = np.stack((np.where(bare_after, last, first), last))
-    return Openings(there, np.where(torn, ring, third), torn)
+    return Openings(there, np.where(torn, ring, third), torn, torn_at, partner)
