@@ -55,10 +55,14 @@ class FeatureGuide:
         self._free = np.ones(count + 1, bool)  # may go anywhere
         self._along = np.full((2, count + 1), -1)  # where a vertex on a sharp line may go
         self._flat = np.zeros(count + 1)
-        self._held = np.zeros(count + 1, bool)  # by base edges, from then on
+        self._held = np.zeros(count + 1, bool)  # from then on, mostly by base edges
         self._held[-1] = True
         self._normals = np.zeros((count + 1, 4))  # the last column unused: rows of 32 bytes are gathered fastest
         self._number = np.zeros(count + 1, np.int64)
+
+    def hold(self, vertices: Bools) -> None:
+        """Keep these vertices, (n,) bool, whatever happens."""
+        self._held[:-1] |= vertices
 
     def weigh(self, points: Floats, faces: Ints, survivor: Ints, blocks: Blocks) -> np.ndarray:
         """Return what each side costs: one less its weight, infinite where neither end may go.
