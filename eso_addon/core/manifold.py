@@ -2,6 +2,7 @@
 """Where a mesh is open, and faces that are wound against their neighbours."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .adjacency import components, sorting_order
 from .mesh import Bools, Ints
@@ -97,7 +98,7 @@ def orient(faces: Ints, count: int) -> Bools:
     return (turned == 1) ^ most.take(part)
 
 
-def _two_colours(count: int, one: Ints, other: Ints, differ: Ints) -> Ints:
+def _two_colours(count: int, one: Ints, other: Ints, differ: NDArray[np.int8]) -> NDArray[np.int8]:
     """Give each node of a graph 0 or 1 so that the ends of links differ where they should, as far as that can be.
 
     Like `components`: each root takes a lower root that it is linked to, and all paths are cut short.

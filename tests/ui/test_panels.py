@@ -109,6 +109,7 @@ def test_in_place_is_greyed_with_the_reason_for_linked_data(tmp_path: Path) -> N
 
 
 def test_the_last_run_is_shown() -> None:
+    bpy.context.window_manager.property_unset("eso_last_run")  # the window outlives the file
     assert not panels.VIEW3D_PT_eso_last_run.poll(bpy.context)
     add_sphere()
     bpy.ops.object.eso_simplify(ratio=0.5)
