@@ -10,6 +10,7 @@ only (where the corner has the lower number), so edges need no list of their own
 
 from collections.abc import Generator
 from dataclasses import dataclass, field
+from typing import Protocol
 
 import numpy as np
 
@@ -17,7 +18,6 @@ from .blocks import Blocks
 from .manifold import boundary_fans
 from .mesh import Bools, Floats, Ints
 from .quadrics import (
-    WIDTH,
     Components,
     cross,
     endpoint_costs,
@@ -36,9 +36,10 @@ _GATHER = pow(_SCATTER, -1, 1 << 32)
 # faces a block: its arrays stay in the second cache
 _BLOCK = 16384
 _SAMPLES = 8192
-# with fewer faces than this the share shrinks with them, to this part: small meshes are collapsed with more care
+# no face may shrink to less than this part of its area: flat meshes would fill with faces without any
+_SLIVER = 1e-3
+# with fewer faces than this the share shrinks with them: small meshes are collapsed with more care
 _LARGE = 20_000
-_CAREFUL = 0.3
 
 
 @dataclass(frozen=True)
@@ -57,6 +58,12 @@ class Rules:
         The link condition: no collapse changes the topology.
     share : float
         The part of the edges, the cheapest, from which a batch is chosen.
+    careful : float
+        On small meshes the share shrinks with the faces, to this part of it.
+    few : int
+        Where no more edges than this are left to try, all of them may go.
+    passes : int
+        How often a batch is filled up with edges that are cheapest among those that its vertices leave over.
     spread : float
         These edges cost at most so many times what the cheapest eighth of them does.
     curvature_factor : bool
@@ -68,8 +75,27 @@ class Rules:
     flip: float = 0.5
     guard: bool = True
     share: float = 0.5
+    careful: float = 0.3
+    few: int = 0
+    passes: int = 1
     spread: float = 3.0
     curvature_factor: bool = False
+
+
+class Guide(Protocol):
+    """Weighs edges by the mesh as it is before each batch, in place of the quadrics; survivors stay where they are."""
+
+    def hold(self, vertices: Bools) -> None:
+        """Keep these vertices, (n,) bool."""
+
+    def weigh(self, points: Floats, faces: Ints, survivor: Ints, blocks: Blocks) -> np.ndarray:
+        """Return the cost of each side, (3, m) float32, infinite where neither end may go."""
+
+    def swaps(self, one: Ints, other: Ints) -> Bools:
+        """Tell where the first vertex of an edge goes and the second stays."""
+
+    def clashes(self, survivor: Ints, label: Ints) -> Ints:
+        """Return the collapses of the batch that must not be done beside the others."""
 
 
 @dataclass
@@ -85,6 +111,7 @@ class _State:
     fans: Ints  # (n + 1,) runs of faces from boundary to boundary
     locked: Bools | None  # (n,)
     alive: int
+    guide: Guide | None = None
     costs: np.ndarray = field(init=False)  # (3, m) float32
     base: np.ndarray = field(init=False)  # (3, m) float32, costs before the curvature factor
     dead: int = 0
@@ -147,7 +174,8 @@ class _Touched:
 _Links = tuple[Ints, Ints, Ints, Ints]
 
 def collapse_steps(points: Floats, faces: Ints, quadrics: Floats, boundary: Bools, locked: Bools | None, target: int,
-                   rules: Rules, blocks: Blocks) -> Generator[int, None, CollapseRecord]:
+                   rules: Rules, blocks: Blocks,
+                   guide: Guide | None = None) -> Generator[int, None, CollapseRecord]:
     """Collapse edges until `target` faces are left or nothing more can go.
 
     Parameters
@@ -164,6 +192,8 @@ def collapse_steps(points: Floats, faces: Ints, quadrics: Floats, boundary: Bool
     target : int
     rules : Rules
     blocks : Blocks
+    guide : Guide, optional
+        Weighs in place of the quadrics, which may then be zeros; with endpoint placement only.
 
     Yields
     ------
@@ -181,7 +211,9 @@ def collapse_steps(points: Floats, faces: Ints, quadrics: Floats, boundary: Bool
     if (fans > 1).any():  # boundaries meet there: such vertices stay where they are
         locked = (fans[:-1] > 1) if locked is None else locked | (fans[:-1] > 1)
     state = _State(rules, blocks, rows, quadrics.copy(), faces.copy(), np.append(boundary, False), fans, locked,
-                   faces.shape[1])
+                   faces.shape[1], guide)
+    if guide is not None and locked is not None:
+        guide.hold(locked)
     history: list[tuple] = []
     faces_before = state.alive
     _weigh(state)
@@ -227,6 +259,8 @@ def _counts(state: _State, start: Ints, end: Ints) -> Bools:
 
 def _edge_costs(state: _State, one: Ints, other: Ints) -> np.ndarray:
     locked = state.locked
+    if state.guide is not None:
+        return np.zeros(len(one), np.float32)  # the guide adds its costs to what was not rejected
     if state.rules.endpoint:
         at_one, at_other = endpoint_costs(state.quadrics, state.points, one, other)
         if locked is not None:
@@ -243,7 +277,11 @@ def _edge_costs(state: _State, one: Ints, other: Ints) -> np.ndarray:
 
 
 def _apply_factor(state: _State) -> None:
-    """Multiply by the curvature factor of Equation 5, as it is now."""
+    """Multiply by the curvature factor of Equation 5, or let the guide weigh, as the mesh is now."""
+    if state.guide is not None:
+        state.costs = state.guide.weigh(state.points, state.faces, state.survivor, state.blocks)
+        state.costs += state.base
+        return
     if not state.rules.curvature_factor:
         state.costs = state.base
         return
@@ -261,12 +299,20 @@ def _choose(state: _State) -> _Batch | None:
     if threshold is None:
         return None
     one, other, keys = _candidates(state, threshold)
-    np.minimum.at(state.best, one, keys)
-    np.minimum.at(state.best, other, keys)
-    best = np.flatnonzero((state.best.take(one) == keys) & (state.best.take(other) == keys))
-    state.best[one] = _NONE
-    state.best[other] = _NONE
-    keys = np.sort(keys.take(best))
+    chosen: list[Ints] = []
+    best, taken = np.zeros(0, np.int64), np.zeros(len(state.points), bool)
+    for _ in range(state.rules.passes):
+        if chosen:
+            taken[one.take(best)] = taken[other.take(best)] = True
+            left = np.flatnonzero(~(taken.take(one) | taken.take(other)))
+            one, other, keys = one.take(left), other.take(left), keys.take(left)
+        np.minimum.at(state.best, one, keys)
+        np.minimum.at(state.best, other, keys)
+        best = np.flatnonzero((state.best.take(one) == keys) & (state.best.take(other) == keys))
+        state.best[one] = _NONE
+        state.best[other] = _NONE
+        chosen.append(keys.take(best))
+    keys = np.sort(np.concatenate(chosen))
     slot = ((keys & _LOW) * _GATHER) & _LOW
     return _place(state, slot, (keys >> 32).astype(np.int32).view(np.float32))
 
@@ -281,7 +327,9 @@ def _threshold(state: _State) -> np.float32 | None:
         if len(sample) == 0:
             return None
     last = len(sample) - 1
-    share = state.rules.share * min(max(state.alive / _LARGE, _CAREFUL), 1.0)
+    if last < state.rules.few:
+        return sample.max()
+    share = state.rules.share * min(max(state.alive / _LARGE, state.rules.careful), 1.0)
     cheapest, cheap = int(share / 8 * last), int(share * last)
     sample = np.partition(sample, (cheapest, cheap))
     return min(sample[cheap], state.rules.spread * sample[cheapest])
@@ -316,11 +364,16 @@ def _place(state: _State, slot: Ints, cost: np.ndarray) -> _Batch:
     """Find where the vertex of each chosen edge is to stand and which of the two goes, and label both."""
     one, other = _ends(state.faces, slot)
     count = len(slot)
-    batch = _Batch(one, other, slot, cost, np.empty((count, WIDTH)), np.zeros((count, 4)), np.zeros(count, bool),
-                   np.zeros(count, bool), state.boundary.take(one) | state.boundary.take(other))
+    batch = _Batch(one, other, slot, cost, np.empty((count, state.quadrics.shape[1])), np.zeros((count, 4)),
+                   np.zeros(count, bool), np.zeros(count, bool), state.boundary.take(one) | state.boundary.take(other))
 
-    def place(part: slice) -> None:
+    def merge(part: slice) -> None:
         one, other = batch.one[part], batch.other[part]
+        if state.guide is not None:
+            swap = state.guide.swaps(one, other)
+            batch.one[part], batch.other[part] = np.where(swap, other, one), np.where(swap, one, other)
+            batch.places[part], batch.stays[part] = state.points.take(batch.one[part], axis=0), True
+            return
         first, second = state.quadrics.take(one, axis=0), state.quadrics.take(other, axis=0)
         starts, ends = state.points.take(one, axis=0).T[:3], state.points.take(other, axis=0).T[:3]
         summed = first + second
@@ -333,6 +386,9 @@ def _place(state: _State, slot: Ints, cost: np.ndarray) -> _Batch:
             places = np.where(stays, places, optimal_places(summed)) if stays.any() else optimal_places(summed)
         move_memory(summed, first, second, starts, ends, places, state.rules.memory)
         batch.quadrics[part], batch.places[part, :3], batch.stays[part] = summed, places.T, stays
+
+    def place(part: slice) -> None:
+        merge(part)
         one, other = batch.one[part], batch.other[part]
         state.label[one] = state.label[other] = np.arange(part.start, part.stop)
         state.survivor[other] = one
@@ -372,8 +428,12 @@ def _test(state: _State, batch: _Batch) -> None:
         rejected[flipped] = True
     if state.rules.guard:
         rejected |= _broken(state, batch, [links for _, _, _, links in tested])
+    if state.guide is not None:
+        rejected[state.guide.clashes(state.survivor, state.label)] = True
     while rejected.any():
         rejected = _reject(state, batch, rejected)
+        if state.guide is not None and not rejected.any():
+            rejected[state.guide.clashes(state.survivor, state.label)] = True
 
 
 def _touched(state: _State, part: slice) -> _Touched:
@@ -398,7 +458,7 @@ def _flips(state: _State, touched: _Touched) -> Ints:
     """Return the collapses that turn a face too far, each in the state that the cheaper ones leave."""
     corner, label = touched.corner, touched.label
     old = _normals(state.before, corner)
-    flipped = np.flatnonzero(_turned(state, old, _normals(state.after, corner)))
+    flipped = np.flatnonzero(_turned(state, old, _normals(state.after, corner)) & (touched.gone == _NONE))
     found = [label.take(flipped, axis=1).max(axis=0, initial=-1)]
     # faces of several collapses pass through states in between
     last = label.take(touched.mixed, axis=1).max(axis=0, initial=-1)
@@ -414,10 +474,10 @@ def _flips(state: _State, touched: _Touched) -> Ints:
 
 def _turned(state: _State, old: Components, new: Components) -> Bools:
     turn = old[0] * new[0] + old[1] * new[1] + old[2] * new[2]
-    lengths = old[0] * old[0] + old[1] * old[1] + old[2] * old[2]
-    lengths *= new[0] * new[0] + new[1] * new[1] + new[2] * new[2]
+    was, becomes = (side[0] * side[0] + side[1] * side[1] + side[2] * side[2] for side in (old, new))
     least = state.rules.flip
-    return turn * np.abs(turn) < np.float32(least * abs(least)) * lengths
+    needed = np.maximum(np.float32(least * abs(least)) * becomes, np.float32(_SLIVER**2) * was)
+    return (turn * np.abs(turn) <= needed * was) & (was > 0)
 
 
 def _normals(rows: np.ndarray, corner: Ints) -> tuple:
@@ -541,7 +601,7 @@ def _collapse(state: _State, batch: _Batch, target: int) -> tuple | None:
     state.base.ravel()[failed] = np.inf
     state.label[kept], state.label[gone] = ~kept, ~gone
     if len(chosen) == 0:
-        _apply_factor(state)
+        state.costs.ravel()[failed] = np.inf
         return None
     faces_left = state.alive - removed.take(chosen)
     state.dead += state.alive - int(faces_left[-1])

@@ -86,7 +86,7 @@ def level(mesh: Prepared, record: CollapseRecord, original: Mesh, length: int,
     corners, placed = number.take(corners), points.take(alive, axis=0)
     merged = number.take(survivor)  # of the engine's vertices
     vertex_map = np.where(mesh.vertex >= 0, merged.take(mesh.vertex, mode="clip"), -1)
-    if options.refit and options.placement == "optimal" and length:
+    if options.refit and options.moves and length:
         # the engine's vertices stand for the input's, so that seams stay closed
         placed = refit(placed, corners, vertices[mesh.source], mesh.faces.T, vertex_map=merged)
     face_map = mesh.face[face_map]
@@ -107,13 +107,14 @@ def _split(sheet: Ints, input_corners: Ints, points: Floats, corners: Ints,
     return points.take(keys // count, axis=0), numbers.reshape(corners.shape), np.where(there, found, -1)
 
 
-def judge_count(result: SimplifyResult, target: int) -> SimplifyResult:
+def judge_count(result: SimplifyResult, target: int, options: Options) -> SimplifyResult:
     """Return the result, saying so where it stopped short of its target."""
     left = len(result.faces)
-    if left <= target:
+    if left <= target or target == 0:
         return result
-    message = (f"stopped at {left} of {target} triangles: no further edge can go without changing the topology; "
-               "prune small parts to go on")
+    reason = ("losing a feature; lower epsilon to go on" if options.method == "feature" else
+              "changing the topology; prune small parts to go on")
+    message = f"stopped at {left} of {target} triangles: no further edge can go without {reason}"
     return replace(result, reached=False, messages=(*result.messages, message))
 
 

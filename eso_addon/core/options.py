@@ -4,14 +4,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from .collapse import Rules
 from .mesh import MeshError
-from .variation import METHODS
+from .variation import METHODS as WEIGHTS
+
+METHODS = (*WEIGHTS, "feature")
 
 
 @dataclass(frozen=True)
@@ -22,6 +25,13 @@ class Options:
     ----------
     method : str
         Vertex weights: "eso" (Equation 8), "so" (Equation 7), "qem" (none), or "cf" (edge factor of Equation 5).
+        "feature" (Chen and Nishita) has none: see `feature_collapse`; its survivors stay where they are.
+    epsilon : float, optional
+        For "feature": edges whose virtual edge weighs less, from -1 to 1, are held; without it none is.
+    sharp_angle : float, optional
+        For "feature": edges between faces further apart than so many degrees are sharp.
+    sharp : array_like, (s, 2) int, optional
+        For "feature": more sharp edges, as pairs of input vertices; `features.sharp_edges` finds those of attributes.
     rings : int
         Rings of "eso".
     placement : str
@@ -45,6 +55,9 @@ class Options:
     """
 
     method: str = "eso"
+    epsilon: float | None = None
+    sharp_angle: float | None = None
+    sharp: ArrayLike | None = None
     rings: int = 3
     placement: str = "optimal"
     weight_power: float = 0.5
@@ -74,14 +87,26 @@ class Options:
         number("share", self.share, 1e-6, 1)
         number("spread", self.spread, 1, np.inf)
         number("prune", self.prune, 0, np.inf)
+        if self.epsilon is not None:
+            number("epsilon", self.epsilon, -1, 1)
+        if self.sharp_angle is not None:
+            number("sharp_angle", self.sharp_angle, 0, 180)
         if self.threads is not None:
             number("threads", self.threads, 1, 1024, whole=True)
 
     @property
+    def moves(self) -> bool:
+        """Whether survivors may move."""
+        return self.placement == "optimal" and self.method != "feature"
+
+    @property
     def rules(self) -> Rules:
         """What these options let the engine do."""
-        return Rules(self.placement == "endpoint", self.memory, self.flip, self.guard, self.share, self.spread,
-                     self.method == "cf")
+        rules = Rules(endpoint=not self.moves, memory=self.memory, flip=self.flip, guard=self.guard, share=self.share,
+                      spread=self.spread, curvature_factor=self.method == "cf")
+        # a weight renewed before each batch bears large ones: measured in docs/decisions/features.md
+        return rules if self.method != "feature" else replace(
+            rules, flip=0.2, guard=True, share=0.75, careful=1.0, few=2000, passes=4, spread=np.inf)
 
 
 # the equations as printed: planes of weight one, weights once and to the first power, nothing held, edges only
@@ -117,9 +142,11 @@ def options_of(preset: str, chosen: dict[str, Any]) -> Options:
 
 
 def targets_of(face_count: int, ratios: Sequence[float] | None, faces_targets: Sequence[int] | None,
-               max_errors: Sequence[float] | None) -> tuple[list[int], list[float]]:
-    """Return targets of one kind: as counts of faces, or as errors."""
+               max_errors: Sequence[float] | None, *, needed: bool = True) -> tuple[list[int], list[float]]:
+    """Return targets of one kind: as counts of faces, or as errors; a count of 0 where none is given nor needed."""
     given = [kind for kind in (ratios, faces_targets, max_errors) if kind is not None]
+    if not given and not needed:
+        return [0], []
     if len(given) != 1 or len(given[0]) == 0:
         raise MeshError("give one target: ratio, faces_target or max_error")
     if ratios is not None:

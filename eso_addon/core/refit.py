@@ -18,7 +18,8 @@ Floats = NDArray[Any]  # float64, or float32 where only a choice hangs on it
 Ints = NDArray[np.int64]
 
 _ROUNDS = 2
-_PER_FACE = 10  # samples wanted for each simplified face
+_PER_FACE = 10  # samples wanted for each simplified face,
+_LEAST = 5000  # and at least so many in all: they are soon done, and miss nothing of a small mesh
 _DAMPING = 0.3  # pull towards the present position, relative to what evenly spread samples weigh
 _TILT = 0.03  # weight of a tilt against the original's normal, times an edge, beside that of a distance
 _AGREE = 0.5  # least cosine between a sample's normal and its face's for the tilt to count
@@ -72,7 +73,7 @@ def refit(
     # unit size and the origin in the middle keep the precision of small parts of large scenes
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     center, size = (low + high) / 2, float((high - low).max()) or 1.0
-    samples, weights, corner, normals = _samples(original_vertices, original_faces, _PER_FACE * len(faces))
+    samples, weights, corner, normals = _samples(original_vertices, original_faces, max(_PER_FACE * len(faces), _LEAST))
     # single precision decides which face is near: it takes half the time, and positions are solved in double
     exact = np.ascontiguousarray(((samples - center) / size).T)
     points = exact.astype(np.float32)

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from .blocks import Blocks
 from .collapse import collapse_steps
+from .feature_collapse import guide_for
 from .levels import SimplifyResult, in_input_units, judge_count, level, within
 from .mesh import check_mesh
 from .options import options_of, targets_of
@@ -95,15 +96,18 @@ def lod_chain_steps(vertices: ArrayLike, faces: ArrayLike, ratios: Sequence[floa
     """Do what `lod_chain` does in steps: yields progress from 0 to 1, returns the levels, may be closed at any time."""
     chosen = options_of(preset, options)
     original = check_mesh(vertices, faces)
-    counts, errors = targets_of(len(original[1]), ratios, faces_targets, max_errors)
+    counts, errors = targets_of(len(original[1]), ratios, faces_targets, max_errors,
+                               needed=chosen.method != "feature")
     mesh = prepare(*original, join=chosen.weld, prune=chosen.prune)
     blocks = Blocks(chosen.threads)
     try:
         yield 0.02
+        guide = guide_for(mesh, chosen) if chosen.method == "feature" else None
         quadrics = initial_quadrics(mesh, chosen, blocks)
         yield 0.1
         least = min(counts) if counts else 0
-        run = collapse_steps(mesh.points, mesh.faces, quadrics, mesh.opened, None, least, chosen.rules, blocks)
+        run = collapse_steps(mesh.points, mesh.faces, quadrics, mesh.opened, None, least, chosen.rules, blocks,
+                             guide)
         total = max(mesh.faces.shape[1] - least, 1)
         record = yield from _scaled(run, lambda left: 0.1 + 0.7 * (1 - (left - least) / total))
     finally:
@@ -113,7 +117,7 @@ def lod_chain_steps(vertices: ArrayLike, faces: ArrayLike, ratios: Sequence[floa
     for number in range(len(counts) + len(errors)):
         if counts:
             result = level(mesh, record, original, record.length_for(counts[number]), chosen)
-            result = judge_count(result, counts[number])
+            result = judge_count(result, counts[number], chosen)
         else:
             result = within(mesh, record, original, errors[number], chosen)
         results.append(result)

@@ -23,8 +23,10 @@ def initial_quadrics(mesh: Prepared, options: Options, blocks: Blocks) -> Floats
     Returns
     -------
     ndarray, (n, 12) float64
-        See `quadrics`.
+        See `quadrics`; without columns for "feature", which has none.
     """
+    if options.method == "feature":
+        return np.zeros((mesh.points.shape[1], 0))
     parts = plane_quadrics(mesh.points, mesh.faces, area_weighted=options.area_weighted)
     if options.boundary_weight > 0 and len(mesh.boundary):
         sides = mesh.boundary

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import inspect
 from itertools import pairwise
 
 import numpy as np
@@ -12,7 +11,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
-from eso_addon.core.collapse import collapse_steps
 from eso_addon.core.feature_collapse import FeatureGuide
 from eso_addon.core.features import base_edges, esod_weights, mean_normals, sharp_edges, side_pairs, sod_weights
 from eso_addon.core.mesh import MeshError
@@ -25,7 +23,6 @@ from .shapes import Floats, Ints, Mesh
 Edge = frozenset[int]
 seeds = st.integers(0, 2**32 - 1)
 epsilons = st.sampled_from([None, -0.5, 0.0, 0.5, 0.9])
-guided = pytest.mark.skipif("guide" not in inspect.signature(collapse_steps).parameters, reason="engine without guides")
 
 
 def faces_of_edges(faces: Ints) -> dict[Edge, list[int]]:
@@ -209,7 +206,6 @@ def engine_mesh(mesh: Mesh) -> Mesh:
     return mesh[0][prepared.source], np.ascontiguousarray(prepared.faces.T)
 
 
-@guided
 @settings(max_examples=40, deadline=None)
 @given(seeds, epsilons)
 def test_every_collapse_keeps_the_rules_and_nothing_is_left_to_do(seed: int, epsilon: float | None) -> None:
@@ -230,7 +226,6 @@ def test_every_collapse_keeps_the_rules_and_nothing_is_left_to_do(seed: int, eps
         assert flips or not left.keeps_topology(onto, v), (v, onto)
 
 
-@guided
 @settings(max_examples=40, deadline=None)
 @given(seeds, epsilons)
 def test_survivors_stay_and_topology_is_kept(seed: int, epsilon: float | None) -> None:
@@ -247,7 +242,6 @@ def test_survivors_stay_and_topology_is_kept(seed: int, epsilon: float | None) -
     assert_array_equal(again.record.removed, result.record.removed)
 
 
-@guided
 @settings(max_examples=40, deadline=None)
 @given(seeds, epsilons)
 def test_a_target_cuts_the_same_record(seed: int, epsilon: float | None) -> None:
@@ -268,7 +262,6 @@ def test_a_target_cuts_the_same_record(seed: int, epsilon: float | None) -> None
             assert len(level.faces) == least
 
 
-@guided
 @settings(max_examples=40, deadline=None)
 @given(seeds, epsilons)
 def test_any_mesh_gets_no_worse(seed: int, epsilon: float | None) -> None:
@@ -282,7 +275,6 @@ def test_any_mesh_gets_no_worse(seed: int, epsilon: float | None) -> None:
         assert (shapes.edge_uses(result.faces.astype(np.int64)) <= 2).all()
 
 
-@guided
 def test_a_flat_sheet_keeps_its_corners_and_a_cube_its_edges() -> None:
     vertices, faces = shapes.sheet(12, 12)
     result = simplify(vertices, faces, method="feature", epsilon=0.0)
@@ -293,7 +285,6 @@ def test_a_flat_sheet_keeps_its_corners_and_a_cube_its_edges() -> None:
     assert_allclose(np.abs(result.vertices), 1)
 
 
-@guided
 def test_borders_of_materials_stay() -> None:
     vertices, faces = shapes.sheet(10, 10)
     center = vertices[faces].mean(axis=1)
@@ -306,7 +297,6 @@ def test_borders_of_materials_stay() -> None:
     assert len(result.faces) < 14
 
 
-@guided
 def test_more_is_held_as_epsilon_grows() -> None:
     vertices, faces = shapes.noisy(shapes.ball(4), np.random.default_rng(1), 0.01)
     left = [len(simplify(vertices, faces, method="feature", epsilon=epsilon).faces)
@@ -315,7 +305,6 @@ def test_more_is_held_as_epsilon_grows() -> None:
     assert left[-1] == len(faces)
 
 
-@guided
 @pytest.mark.parametrize(("options", "message"), [
     ({"epsilon": 2.0}, "epsilon is 2.0"), ({"epsilon": "sharp"}, "epsilon"), ({"sharp_angle": -1}, "sharp_angle"),
     ({"sharp": [[0, 99999]]}, "sharp names a vertex"), ({"sharp": [0, 1, 2]}, "sharp must be")])
