@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     Part = tuple[str, NDArray[np.float64], NDArray[np.int64]]
 
 FORMATS = (".blend", ".fbx", ".glb", ".gltf", ".obj", ".off", ".ply", ".stl")
-METHODS = ("eso", "so", "cf", "qem")
+METHODS = ("eso", "so", "cf", "qem", "feature")
 ENDING = ".esopm"
 _ENGINE_WORDS = ("method", "rings", "preset", "placement", "prune", "weld")
 
@@ -131,6 +131,8 @@ def _parser() -> argparse.ArgumentParser:
     targets.add_argument("--ratio", type=_ratio, metavar="R", help="share of the triangles to keep, of each mesh")
     targets.add_argument("--faces", type=_count, metavar="N", help="triangles to keep, of all meshes together")
     targets.add_argument("--max-error", type=_length, metavar="E", help="largest deviation, in the file's units")
+    targets.add_argument("--epsilon", type=_epsilon, metavar="X",
+                         help="method feature: go on until only features are left, those whose weight is below X")
     _add_engine_words(simplify)
     lod = _add_word(words, "lod", _lod, "write several levels of detail", "IN", "OUT")
     targets = lod.add_mutually_exclusive_group(required=True)
@@ -217,7 +219,7 @@ def _add_word(
 def _add_engine_words(parser: argparse.ArgumentParser) -> None:
     """Add the engine's options; one that is not given is left to the engine."""
     parser.argument_default = argparse.SUPPRESS
-    parser.add_argument("--method", choices=METHODS, help="how vertices are weighted (default: eso)")
+    parser.add_argument("--method", choices=METHODS, help="how edges are weighed (default: eso)")
     parser.add_argument("--rings", type=_count, metavar="N", help="rings of neighbours that a weight looks at")
     parser.add_argument("--preset", choices=("paper",), help="the equations as the paper prints them")
     parser.add_argument("--placement", choices=("optimal", "endpoint"), help="where a new vertex stands")
@@ -238,6 +240,10 @@ def _ratio(word: str) -> float:
 
 def _length(word: str) -> float:
     return _number(word, lambda length: 0 <= length < float("inf"), "a length, 0 or more")
+
+
+def _epsilon(word: str) -> float:
+    return _number(word, lambda epsilon: -1 <= epsilon <= 1, "a number from -1 to 1")
 
 
 def _count(word: str) -> int:
@@ -261,8 +267,11 @@ def _list_of(read: Callable[[str], float]) -> Callable[[str], list[float]]:
 def _simplify(args: argparse.Namespace) -> None:
     from .core.simplify import simplify
 
-    keyword, value = _target({"ratio": args.ratio, "faces_target": args.faces, "max_error": args.max_error})
+    keyword, value = _target({"ratio": args.ratio, "faces_target": args.faces, "max_error": args.max_error,
+                              "epsilon": args.epsilon})
     options = _engine_options(args)
+    if keyword == "epsilon" and options.setdefault("method", "feature") != "feature":
+        raise ValueError("--epsilon belongs to --method feature: leave out one of them")
 
     def run(part: "Part", goals: Sequence[float]) -> "list[SimplifyResult]":
         _, vertices, faces = part
