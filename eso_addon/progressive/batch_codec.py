@@ -11,9 +11,9 @@ from ..core.mesh import Bools, Ints
 from .coder import Reader, Writer
 from .errors import StreamError
 from .fans import Fans, fans_at
-from .geometry import Grid, Shape, code_positions
+from .geometry import Grid, Shape, code_positions, place_of
 from .models import Model
-from .splits import Arcs, openings, walk
+from .splits import openings, walk
 
 _ESCAPE = 15
 
@@ -162,7 +162,8 @@ def _code_start(coder: Writer | Reader, model: Model, mesh: Mesh, fans: Fans, ow
         window[left] += toward.take(onward)
         step += 1
         left = left[steps.take(left) > step]
-    order = np.lexsort((fans.slot, -window, own))
+    # one key sorts by split, then by likelihood in single precision; equal ones keep the order of the corners' slots
+    order = np.argsort((own << 32) + place_of(-window), kind="stable")
     begin = np.cumsum(degree) - degree
     rank = None
     context = np.minimum(degree, 15) * 8 + np.minimum(length, 7)

@@ -15,7 +15,7 @@ from .errors import StreamError
 
 MAGIC = b"\x89ESOPM\r\n"
 VERSION = 1
-_FIXED = struct.Struct("<8sHHIII")  # magic, version, flags, header bytes, table bytes, checksum of all that follows here
+_FIXED = struct.Struct("<8sHHIII")  # magic, version, flags, bytes of header and table, their checksum
 _LARGEST_HEADER = 1 << 24
 # a reader must know all of these to understand a file
 FEATURES = ("wedges", "attributes", "extra-faces", "edges", "turned", "quantised")
@@ -153,19 +153,21 @@ def _header(text: bytes) -> dict[str, Any]:
         header = json.loads(inflate(text, _LARGEST_HEADER))
         needs = header["needs"]
         for name, kind in (("places", int), ("faces", int), ("extra", int), ("edges", int), ("vertices", int),
-                           ("wedges", int), ("lanes", int), ("grid", list), ("attributes", list), ("optional", list), ("hash", str)):
-            if not isinstance(header[name], kind) or (kind is int and not 0 <= header[name] < 1 << 31):
+                           ("wedges", int), ("lanes", int), ("grid", list), ("attributes", list),
+                           ("optional", list), ("hash", str)):
+            if type(header[name]) is not kind or (kind is int and not 0 <= header[name] < 1 << 31):
                 raise TypeError
         unknown = sorted(set(needs) - set(FEATURES))
         for name, length, checksum in header["optional"]:
-            if not (isinstance(name, str) and isinstance(length, int) and isinstance(checksum, int) and length >= 0):
+            if not (isinstance(name, str) and type(length) is int and type(checksum) is int and length >= 0):
                 raise TypeError
     except (ValueError, KeyError, TypeError, RecursionError) as error:
         if isinstance(error, StreamError):
             raise
         raise StreamError("the header of the stream says nothing sensible: fetch the file again") from None
     if unknown:
-        raise StreamError(f"the stream needs what this reader does not know ({', '.join(map(str, unknown))}): update it")
+        names = ", ".join(map(str, unknown))
+        raise StreamError(f"the stream needs what this reader does not know ({names}): update it")
     return header
 
 

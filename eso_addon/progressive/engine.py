@@ -11,9 +11,9 @@ import numpy as np
 from ..core.blocks import Blocks
 from ..core.collapse import Rules, collapse_steps
 from ..core.mesh import Bools, Floats, Ints, MeshError
+from ..core.options import Options
 from ..core.prepare import Prepared, prepare
 from ..core.record import CollapseRecord
-from ..core.options import Options
 from ..core.weigh import initial_quadrics
 from .fans import fans_at
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..core.mesh import Floats, Ints
+from ..core.mesh import Ints
 from .coder import CLASSES, Reader, Writer, code_numbers, size_class
 from .fans import Fans
 from .models import Model
@@ -17,6 +17,8 @@ from .splits import Arcs
 GRID_BITS = 25
 # scores and normals use coordinates of so many bits, so that products stay exact in double precision
 _SHORT_BITS = 17
+# no sound number on a grid is as large as this: what damage makes larger is cut, so that products stay in 64 bits
+_FAR = 1 << 27
 
 
 @dataclass(frozen=True)
@@ -43,17 +45,18 @@ class Grid:
         """Return the coordinates of (n, 3) numbers, float32."""
         if self.kind == 2:
             return float_at(numbers)
-        scaled = numbers * self.scale if self.kind == 0 else numbers / self.scale
-        with np.errstate(over="ignore"):
+        with np.errstate(over="ignore", invalid="ignore"):
+            scaled = numbers * self.scale if self.kind == 0 else numbers / self.scale
             return (scaled + np.array(self.origin)).astype(np.float32)
 
     def predictors(self, numbers: Ints) -> Ints:
         """Return the coordinates on the grid of predictions, (n, 3) int64."""
         if self.kind != 2:
             return numbers
-        values = float_at(numbers).astype(np.float64)
+        with np.errstate(invalid="ignore"):  # a signalling NaN
+            values = float_at(numbers).astype(np.float64)
         values[~np.isfinite(values)] = 0.0
-        return np.rint(values * self.scale).astype(np.int64)
+        return np.rint(np.clip(values * self.scale, -_FAR, _FAR)).astype(np.int64)
 
 
 def place_of(values: np.ndarray) -> Ints:
@@ -118,10 +121,11 @@ def code_positions(coder: Writer | Reader, shape: Shape, grid: Grid, points: Int
     for row in range(3):
         off = np.abs(points[:, row].take(ring) - mean[row].take(arcs.split))
         spread += np.bincount(arcs.split, off, len(vertex)).astype(np.int64)
-        spread += np.abs(points[:, row].take(vertex) - mean[row]) + np.abs(points[:, row].take(arcs.first_ring) - mean[row])
+        for end in (vertex, arcs.first_ring):
+            spread += np.abs(points[:, row].take(end) - mean[row])
     spread = spread // size
     values = np.zeros((len(vertex), 3), np.int64)
-    moved = []
+    moved: list[Ints] = []
     scale = spread
     for step, model in enumerate(shape.models):
         at = (axis + 1 + step) % 3
@@ -155,6 +159,7 @@ def _code_one(coder: Writer | Reader, model: Model, grid: Grid, expected: Ints, 
     if grid.kind == 2:
         number = np.clip(number, -(1 << 31), (1 << 31) - 1)
         return number, grid.predictors(number)
+    number = np.clip(number, -_FAR, _FAR)
     return number, number
 
 
@@ -169,7 +174,8 @@ def lossless_grid(positions: np.ndarray) -> tuple[Grid, Ints]:
     largest = float(np.abs(finite).max(initial=0.0))
     exponent = int(np.frexp(largest)[1]) if largest > 0 else 0
     if len(finite) == len(positions):
-        steps = [(1, 10.0**digits) for digits in range(9)] + [(0, 2.0 ** (exponent - bits)) for bits in (12, 16, 20, 24)]
+        steps = [(1, 10.0**digits) for digits in range(9)]
+        steps += [(0, 2.0 ** (exponent - bits)) for bits in (12, 16, 20, 24)]
         for kind, scale in steps:
             count = largest * scale if kind == 1 else largest / scale
             if count >= 1 << GRID_BITS:
@@ -190,7 +196,7 @@ def quantised_grid(positions: np.ndarray, bits: int) -> tuple[Grid, Ints]:
     extent = float((high - low).max()) if len(values) else 0.0
     step = extent / ((1 << bits) - 1) if extent > 0 else 1.0
     numbers = np.rint((values - low) / step).astype(np.int64) if len(values) else np.zeros((0, 3), np.int64)
-    origin = tuple(float(x) for x in low) if len(values) else (0.0, 0.0, 0.0)
+    origin = (float(low[0]), float(low[1]), float(low[2])) if len(values) else (0.0, 0.0, 0.0)
     return _shifted(Grid(0, step, origin, 0), numbers), numbers
 
 
@@ -198,5 +204,3 @@ def _shifted(grid: Grid, predictors: Ints, *, keep: bool = False) -> Grid:
     spread = int((predictors.max(axis=0) - predictors.min(axis=0)).max()) if len(predictors) else 0
     return Grid(grid.kind, grid.scale, grid.origin, max(spread.bit_length() - _SHORT_BITS, 0))
 
-
-Points = Floats

@@ -7,7 +7,6 @@ from ..core.mesh import Ints
 
 SCALE_BITS = 12
 SCALE = 1 << SCALE_BITS
-_LIMIT = 1 << 24
 _GAIN = 32
 
 
@@ -45,6 +44,6 @@ class Model:
         """Count what a batch held."""
         contexts, symbols = self.counts.shape
         new = np.bincount(context * symbols + symbol, minlength=contexts * symbols).reshape(contexts, symbols)
-        self.counts = (self.counts >> 1) + new if int(self.counts.max()) > _LIMIT else (self.counts >> 1) + new
+        self.counts = (self.counts >> 1) + new  # the last batches are most like the next one
         if self.shared is not None:
             self.shared += np.bincount(symbol - context + contexts, minlength=contexts + symbols)

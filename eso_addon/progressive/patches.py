@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..core.mesh import Ints
+from ..core.mesh import Ints, morton_order
 from .batch_codec import Splits
 from .engine import endpoint_options, prepared, run_engine, tangled
 from .history import Batch, Unwinding
@@ -18,7 +18,7 @@ from .source import Source
 _ROUNDS = 12
 # collapses are looked at for one batch until they are this part of the vertices: above half of them, and below,
 # where what is cheap should go first
-_SHARES = (0.5, 0.2)
+_SHARES = (0.5, 0.15)
 
 
 @dataclass
@@ -194,9 +194,8 @@ class _Numbering:
             self._number(batch)
 
     def _along(self, base: Ints) -> Ints:
-        from ..core.mesh import morton_order
-        points = self.source.places[base].astype(np.float64)
-        points[~np.isfinite(points)] = 0
+        places = self.source.places[base]
+        points = np.where(np.isfinite(places), places, 0).astype(np.float64)
         return base.take(morton_order(points)) if len(base) else base
 
     def _number(self, batch: Batch) -> None:
@@ -243,7 +242,7 @@ class _Numbering:
         new_vertex = np.ones(len(wedges), bool)
         new_vertex[1:] = old_vertex[1:] != old_vertex[:-1]
         rows = (self.turn.take(ids) + np.arange(3)[:, None]) % 3
-        columns = self.corner.ravel().take(rows * self.corner.shape[1] + ids) if len(ids) else np.zeros((3, 0), np.int64)
+        columns = np.take_along_axis(self.corner.take(ids, axis=1), rows, 0)
         input_face = self.input_face.take(ids)
         corners = input_face * 3 + columns
         beside = np.ones(len(source.faces), bool)

@@ -202,7 +202,7 @@ class Progressive:
         if bits is not None and not 4 <= bits <= 24:
             raise StreamError(f"bits is {bits}: give a whole number from 4 to 24 (10 to 20 are usual)")
         if bits is not None and not np.isfinite(self._patches.places).all():
-            raise StreamError("a mesh with coordinates that are not finite cannot be quantised: mend it or leave bits out")
+            raise StreamError("a mesh with coordinates that are not finite cannot be quantised: leave bits out")
         return encode(self._patches, bits=bits, keep_order=keep_order, meta=self.meta)
 
     def save(self, path: str | os.PathLike[str], *, bits: int | None = None, keep_order: bool = False) -> int:
@@ -239,7 +239,8 @@ def _ancestors(parents: Ints, limit: int) -> Ints:
         ancestor[limit:] = further
 
 
-def progressive(vertices: ArrayLike, faces: ArrayLike, *, attributes: Mapping[str, Mapping[str, ArrayLike]] | None = None,
+def progressive(vertices: ArrayLike, faces: ArrayLike, *,
+                attributes: Mapping[str, Mapping[str, ArrayLike]] | None = None,
                 edges: ArrayLike | None = None, base_faces: int | None = None, ratio: float | None = None,
                 meta: dict[str, Any] | None = None, **options: Any) -> Progressive:  # noqa: ANN401
     """Make a progressive mesh: a small base, and batches of splits that lead back to every vertex and face.
@@ -251,8 +252,8 @@ def progressive(vertices: ArrayLike, faces: ArrayLike, *, attributes: Mapping[st
     faces : array_like, (m, 3)
         Degenerate, repeated and non-manifold ones are welcome: they come back too.
     attributes : dict of dict of array_like
-        By domain and name: "vertex" (n, ...), "corner" (m, 3, ...), "face" (m, ...), and "side" (m, 3, ...), of the side
-        from each corner to the next.
+        By domain and name: "vertex" (n, ...), "corner" (m, 3, ...), "face" (m, ...), and "side"
+        (m, 3, ...), of the side from each corner to the next.
     edges : array_like, (l, 2)
         Loose edges.
     base_faces, ratio
@@ -280,7 +281,7 @@ def progressive_steps(vertices: ArrayLike, faces: ArrayLike, *,
                       attributes: Mapping[str, Mapping[str, ArrayLike]] | None = None, edges: ArrayLike | None = None,
                       base_faces: int | None = None, ratio: float | None = None, meta: dict[str, Any] | None = None,
                       **options: Any) -> Generator[float, None, Progressive]:  # noqa: ANN401
-    """Do what `progressive` does step by step: yields progress from 0 to 1, returns the mesh, may be closed any time."""
+    """Do what `progressive` does step by step: yields progress from 0 to 1, returns the mesh; may be closed."""
     source = make_source(vertices, faces, attributes, edges)
     if base_faces is not None and ratio is not None:
         raise MeshError("give base_faces or ratio, not both")
@@ -295,7 +296,8 @@ def progressive_steps(vertices: ArrayLike, faces: ArrayLike, *,
     return Progressive(patches, dict(meta or {}))
 
 
-def load_progressive(path: str | os.PathLike[str], *, partial: bool = False, max_bytes: int | None = None) -> Progressive:
+def load_progressive(path: str | os.PathLike[str], *, partial: bool = False,
+                     max_bytes: int | None = None) -> Progressive:
     """Read an .esopm file.
 
     Parameters

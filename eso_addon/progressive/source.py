@@ -114,7 +114,7 @@ def rows_as_bytes(named: Mapping[str, np.ndarray], rows: int) -> np.ndarray:
 
 
 def _wedges(corners: Ints, place: Ints, places: int, named: dict[str, np.ndarray]) -> tuple[Ints, Ints, Ints, Ints]:
-    """Number the different (vertex, corner attributes) at each place."""
+    """Give numbers to the different (vertex, corner attributes) at each place."""
     flat = corners.ravel()
     kind = _distinct(rows_as_bytes(named, len(flat))) if named else np.zeros(len(flat), np.int64)
     kinds = int(kind.max(initial=0)) + 1
@@ -138,7 +138,7 @@ def _wedges(corners: Ints, place: Ints, places: int, named: dict[str, np.ndarray
 
 
 def _distinct(rows: np.ndarray) -> Ints:
-    """Number the different rows of bytes: (n,) int64."""
+    """Give numbers to the different rows of bytes: (n,) int64."""
     if rows.shape[1] == 0:
         return np.zeros(len(rows), np.int64)
     padded = np.zeros((len(rows), -(-rows.shape[1] // 8) * 8), np.uint8)

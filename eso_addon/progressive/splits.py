@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A batch of vertex splits: which corners go from each vertex to its new one, and the faces that open between both.
 
-A split at vertex v takes `length` consecutive corners around it, from `start`, to the new vertex u. Where the arc begins,
-face (u, v, x) opens (`before`), where it ends, face (v, u, y) (`after`); x and y are the first and last ring vertices of
-the arc. At a boundary one of the two may be missing; an arc without corners adds a lone face beside the start corner.
-All splits of a batch are carried out at once, in the mesh before the batch.
+A split at vertex v takes `length` consecutive corners around it, from `start`, to the new vertex u. Where the arc
+begins, face (u, v, x) opens (`before`), where it ends, face (v, u, y) (`after`); x and y are the first and last ring
+vertices of the arc. At a boundary one of the two may be missing; an arc without corners adds a lone face beside the
+start corner. All splits of a batch are carried out at once, in the mesh before the batch.
 """
 
 from dataclasses import dataclass

@@ -365,7 +365,8 @@ def decode(data: bytes, *, partial: bool = False) -> tuple[Patches, dict[str, An
     wedges = header["wedges"] if "wedges" in header["needs"] else header["places"]
     none = np.zeros(0, np.int64)
     patches = Patches(np.zeros((0, 3), np.float32), none, np.zeros((3, 0), np.int64), [], places, faces,
-                      np.zeros((3, 0), np.int64), np.zeros(count + 1, np.int64), np.full(wedges, -1), np.zeros(wedges, np.int64),
+                      np.zeros((3, 0), np.int64), np.zeros(count + 1, np.int64), np.full(wedges, -1),
+                      np.zeros(wedges, np.int64),
                       np.zeros((3, 0), np.int64), np.zeros((3, 0), np.int64), np.zeros(width, np.uint8),
                       np.zeros((0, 2), np.int64), {}, None, None, None, table["error"][:given].astype(np.float64),
                       np.zeros(count, np.uint8))
@@ -376,7 +377,8 @@ def decode(data: bytes, *, partial: bool = False) -> tuple[Patches, dict[str, An
         items = int(np.prod(shape, dtype=np.int64)) * (3 if domain == "side" else 1) * max(dtype.itemsize // 4, 1)
         if items * sizes[domain] > limit:
             raise StreamError("the stream's counts are larger than it can hold: fetch the file again")
-        codec.words.setdefault(domain, []).append((name, np.zeros((sizes[domain], items), np.int64), min(dtype.itemsize, 4)))
+        words = np.zeros((sizes[domain], items), np.int64)
+        codec.words.setdefault(domain, []).append((name, words, min(dtype.itemsize, 4)))
     states = 4 * header["lanes"]
     if not 0 < states <= len(parts.blocks[0]):
         raise StreamError("the header of the stream says nothing sensible: fetch the file again")
@@ -391,7 +393,7 @@ def decode(data: bytes, *, partial: bool = False) -> tuple[Patches, dict[str, An
         if "order" in parts.optional:
             _read_order(patches, parts.optional["order"])
         if digest(patches) != header["hash"]:
-            raise StreamError("the restored mesh is not the one that was written (its hash differs): fetch the file again")
+            raise StreamError("the restored mesh is not the one that was written: fetch the file again")
     return patches, header, parts.damage
 
 
@@ -422,7 +424,8 @@ def _finish(patches: Patches, codec: _Codec, descriptors: list[tuple], given: in
         _, words, _ = codec.words[domain][place[domain]]
         place[domain] += 1
         rows = words[: sizes.get(domain, faces)]
-        patches.attributes.setdefault(domain, {})[name] = from_words(rows, dtype, (3, *shape) if domain == "side" else shape)
+        whole = (3, *shape) if domain == "side" else shape
+        patches.attributes.setdefault(domain, {})[name] = from_words(rows, dtype, whole)
 
 
 def _read_order(patches: Patches, data: bytes) -> None:
