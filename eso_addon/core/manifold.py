@@ -5,7 +5,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .adjacency import components, sorting_order
-from .mesh import Bools, Ints
+from .mesh import Bools, Ints, hashes
 
 
 def open_vertices(faces: Ints, count: int) -> Bools:
@@ -25,11 +25,9 @@ def open_vertices(faces: Ints, count: int) -> Bools:
     -------
     ndarray, (count,) bool
     """
-    mixed = np.arange(1, count + 1, dtype=np.uint64) * np.uint64(0x9E3779B97F4A7C15)
-    mixed = (mixed ^ (mixed >> np.uint64(29))) * np.uint64(0xBF58476D1CE4E5B9)
-    hashed = (mixed >> np.uint64(24)).astype(np.float64)
+    # whole numbers of 40 bits: their sums are exact, beyond thousands of neighbours a vertex may be named in vain
+    hashed = (hashes(count) >> np.uint64(24)).astype(np.float64)
     values = [hashed.take(row) for row in faces]
-    # whole numbers below 2 to the 53rd add up exactly; beyond that a vertex may be named in vain
     balance = np.zeros(count)
     for corner in range(3):
         balance += np.bincount(faces[corner], values[(corner + 1) % 3] - values[(corner + 2) % 3], count)

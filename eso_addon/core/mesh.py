@@ -80,27 +80,17 @@ def weld(vertices: Floats) -> Ints:
     representative : ndarray, (n,) int64
         The lowest index among the vertices at the same position; its own index for a vertex that stands alone.
     """
-    count = len(vertices)
-    own = np.arange(count)
-    if count < 2:
-        return own
-    bits = (vertices + 0.0).view(np.uint64)  # adding zero turns -0.0 into 0.0
-    mixed = bits[:, 0] * np.uint64(0x9E3779B97F4A7C15)
-    mixed = (mixed ^ (mixed >> np.uint64(29)) ^ bits[:, 1]) * np.uint64(0xBF58476D1CE4E5B9)
-    mixed = (mixed ^ (mixed >> np.uint64(32)) ^ bits[:, 2]) * np.uint64(0x94D049BB133111EB)
-    index_bits = np.uint64(max(count - 1, 1).bit_length())
-    low = (np.uint64(1) << index_bits) - np.uint64(1)
-    keys = np.sort((mixed & ~low) | own.astype(np.uint64))
-    order = (keys & low).astype(np.int64)
-    same_hash = (keys[1:] & ~low) == (keys[:-1] & ~low)
-    same_place = same_hash & (vertices[order[1:]] == vertices[order[:-1]]).all(axis=1)
-    if (same_hash & ~same_place).any():  # a collision may stand between two equal positions: sort by position
-        order = np.lexsort((own, vertices[:, 2] + 0.0, vertices[:, 1] + 0.0, vertices[:, 0] + 0.0))
-        same_place = (vertices[order[1:]] == vertices[order[:-1]]).all(axis=1)
-    heads = np.flatnonzero(np.concatenate(([True], ~same_place)))
-    representative = np.empty(count, np.int64)
-    representative[order] = np.repeat(order[heads], np.diff(np.append(heads, count)))
+    order, new = morton_weld(vertices)
+    heads = np.flatnonzero(new)
+    representative = np.empty(len(vertices), np.int64)
+    representative[order] = np.repeat(order.take(heads), np.diff(np.append(heads, len(order))))
     return representative
+
+
+def hashes(count: int) -> NDArray[np.uint64]:
+    """Return (count,) numbers without pattern, one for each index: sums of them tell sets of indices apart."""
+    mixed = np.arange(1, count + 1, dtype=np.uint64) * np.uint64(0x9E3779B97F4A7C15)
+    return (mixed ^ (mixed >> np.uint64(29))) * np.uint64(0xBF58476D1CE4E5B9)
 
 
 def morton_order(points: Floats) -> Ints:

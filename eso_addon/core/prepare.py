@@ -7,7 +7,7 @@ import numpy as np
 
 from .adjacency import vertex_components
 from .manifold import boundary_sides, open_vertices, orient, winding_conflicts
-from .mesh import Bools, Floats, Ints, MeshError, morton_order, morton_weld
+from .mesh import Bools, Floats, Ints, MeshError, hashes, morton_order, morton_weld
 
 
 @dataclass(frozen=True)
@@ -136,8 +136,7 @@ def _distinct(faces: Ints) -> Ints:
     a, b, c = faces
     proper = (a != b) & (b != c) & (c != a)
     # of faces with the same corners the sums are the same: few others are left to compare whole
-    mixed = np.arange(1, int(faces.max(initial=0)) + 2, dtype=np.uint64) * np.uint64(0x9E3779B97F4A7C15)
-    mixed = (mixed ^ (mixed >> np.uint64(29))) * np.uint64(0xBF58476D1CE4E5B9)
+    mixed = hashes(int(faces.max(initial=0)) + 1)
     sums = mixed.take(a) + mixed.take(b) + mixed.take(c)
     ranked = np.sort(sums)
     if (ranked[1:] == ranked[:-1]).any():
