@@ -195,7 +195,7 @@ class _Attempt:
         index[self.old[bare]] = np.arange(len(bare))
         own = index.take(fans.vertex)
         third = mesh._goes.take(self.third.take(bare, axis=1))
-        for which, (link, ring) in enumerate(((fans.predecessor, fans.following), (fans.successor, fans.preceding))):
+        for which, (link, ring) in enumerate(((fans.successor, fans.preceding), (fans.predecessor, fans.following))):
             fits = np.flatnonzero((own >= 0) & (link < 0))
             fits = fits[ring.take(fits) == third[which].take(own.take(fits))]
             fits = fits[there[which].take(own.take(fits))]

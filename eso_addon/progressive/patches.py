@@ -16,9 +16,9 @@ from .history import Batch, Unwinding
 from .source import Source
 
 _ROUNDS = 12
-# collapses are looked at for one batch until they are this part of the vertices: above half of them, and below,
-# where what is cheap should go first
-_SHARES = (0.5, 0.15)
+# with at least this part of the vertices left, collapses are looked at for one batch until they are that part of
+# what is left: large batches cost few bits, small ones let the cheap collapses go first, as coarse levels need
+_SHARES = ((0.5, 0.25), (0.15, 0.1), (0.0, 0.0))
 
 
 @dataclass
@@ -139,7 +139,7 @@ def _regrouped(removed: Ints, kept: Ints, starts: Ints, vertices: int, count: in
     waiting = np.zeros(0, np.int64)
     taken = 0
     while taken < len(ends) or len(waiting):
-        share = _SHARES[vertices * 2 < total]
+        share = next(share for least, share in _SHARES if vertices >= least * total)
         while taken < len(ends) and len(waiting) <= share * vertices:
             waiting = np.concatenate((waiting, np.arange(starts[taken], ends[taken])))
             taken += 1

@@ -65,8 +65,8 @@ def walk(fans: Fans, start: Ints, length: Ints, before: Bools) -> Arcs:
     first_ring = fans.following.take(start)
     last_ring = fans.preceding.take(last)
     # beside a lone corner both new edges end at the same ring vertex
-    last_ring = np.where(bare & before, first_ring, last_ring)
-    first_ring = np.where(bare & ~before, last_ring, first_ring)
+    first_ring = np.where(bare & before, last_ring, first_ring)
+    last_ring = np.where(bare & ~before, first_ring, last_ring)
     return Arcs(np.concatenate(splits), np.concatenate(corners), last, first_ring, last_ring)
 
 
@@ -133,8 +133,9 @@ def openings(fans: Fans, arcs: Arcs, vertex: Ints, start: Ints, there: Bools, fa
     flat = faces.ravel()
     size = len(flat)
     # the neighbour of the new face holds the ring vertex as it is after the batch
-    bare_after = there[1] & ~there[0] & (arcs.first_ring != fans.following.take(start))
+    bare_before = there[0] & ~there[1] & (arcs.first_ring != fans.following.take(start))
+    bare_after = there[1] & ~there[0] & (arcs.last_ring != fans.preceding.take(arcs.last))
     first = flat.take((fans.slot.take(start) + width) % max(size, 1)) if size else ring[0]
     last = flat.take((fans.slot.take(arcs.last) + 2 * width) % max(size, 1)) if size else ring[1]
-    third = np.stack((np.where(bare_after, last, first), last))
+    third = np.stack((np.where(bare_before, last, first), np.where(bare_after, first, last)))
     return Openings(there, np.where(torn, ring, third), torn, torn_at, partner)
