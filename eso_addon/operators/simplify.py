@@ -6,8 +6,8 @@ import bpy
 from ..bridge import objects
 from ..bridge.read_mesh import MeshArrays, read_mesh
 from ..bridge.write_mesh import write_mesh
-from ..core.mesh import MeshError
 from ..core.levels import SimplifyResult
+from ..core.mesh import MeshError
 from ..core.simplify import simplify_steps
 from ..jobs.modal import EngineOperator
 from ..jobs.worker import Steps
