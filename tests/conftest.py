@@ -1,10 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What all tests share."""
 
+import os
 from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
+
+# The suite is the same at every run, so that a change is judged by what it changed; HYPOTHESIS=explore looks further.
+settings.register_profile("steady", derandomize=True, deadline=None)
+settings.register_profile("explore", deadline=None, max_examples=2000)
+settings.load_profile("explore" if os.environ.get("HYPOTHESIS") == "explore" else "steady")
 
 
 @pytest.fixture(scope="session")
