@@ -8,14 +8,10 @@ from typing import Any, TypeVar
 
 from numpy.typing import ArrayLike
 
-from .blocks import Blocks
-from .collapse import collapse_steps
-from .feature_collapse import guide_for
-from .levels import SimplifyResult, in_input_units, judge_count, level, within
+from .levels import SimplifyResult
 from .mesh import check_mesh
 from .options import options_of, targets_of
-from .prepare import prepare
-from .weigh import initial_quadrics
+from .recording import recording_steps, scaled
 
 Value = TypeVar("Value")
 
@@ -98,31 +94,9 @@ def lod_chain_steps(vertices: ArrayLike, faces: ArrayLike, ratios: Sequence[floa
     original = check_mesh(vertices, faces)
     counts, errors = targets_of(len(original[1]), ratios, faces_targets, max_errors,
                                needed=chosen.method != "feature")
-    mesh = prepare(*original, join=chosen.weld, prune=chosen.prune)
-    blocks = Blocks(chosen.threads)
-    try:
-        yield 0.02
-        guide = guide_for(mesh, chosen) if chosen.method == "feature" else None
-        quadrics = initial_quadrics(mesh, chosen, blocks)
-        yield 0.1
-        least = min(counts) if counts else 0
-        run = collapse_steps(mesh.points, mesh.faces, quadrics, mesh.opened, None, least, chosen.rules, blocks,
-                             guide)
-        total = max(mesh.faces.shape[1] - least, 1)
-        record = yield from _scaled(run, lambda left: 0.1 + 0.7 * (1 - (left - least) / total))
-    finally:
-        blocks.close()
-    record = in_input_units(record, mesh, original[0])
-    results = []
-    for number in range(len(counts) + len(errors)):
-        if counts:
-            result = level(mesh, record, original, record.length_for(counts[number]), chosen)
-            result = judge_count(result, counts[number], chosen)
-        else:
-            result = within(mesh, record, original, errors[number], chosen)
-        results.append(result)
-        yield 0.8 + 0.2 * len(results) / (len(counts) + len(errors))
-    return results
+    least = min(counts) if counts else 0
+    recording = yield from scaled(recording_steps(original, chosen, least), lambda part: 0.8 * part)
+    return (yield from scaled(recording.levels_steps(counts, errors), lambda part: 0.8 + 0.2 * part))
 
 
 def _finish(steps: Generator[Any, None, Value]) -> Value:
@@ -130,13 +104,5 @@ def _finish(steps: Generator[Any, None, Value]) -> Value:
     while True:
         try:
             next(steps)
-        except StopIteration as end:
-            return end.value
-
-
-def _scaled(steps: Generator[int, None, Value], scale: Any) -> Generator[float, None, Value]:  # noqa: ANN401
-    while True:
-        try:
-            yield scale(next(steps))
         except StopIteration as end:
             return end.value

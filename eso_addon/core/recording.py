@@ -1,0 +1,103 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A run of the engine kept with the mesh that it ran on, so that further levels cost no further run."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, TypeVar
+
+from .blocks import Blocks
+from .collapse import collapse_steps
+from .feature_collapse import guide_for
+from .levels import Mesh, SimplifyResult, in_input_units, judge_count, level, within
+from .options import Options
+from .prepare import Prepared, prepare
+from .record import CollapseRecord
+from .weigh import initial_quadrics
+
+Value = TypeVar("Value")
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """What one run of the engine did, and to what.
+
+    Attributes
+    ----------
+    mesh : Prepared
+    record : CollapseRecord
+        In the input's units.
+    original : tuple of ndarray
+        Vertices (n, 3) float64 and faces (m, 3) int64 as they were given.
+    options : Options
+    least : int
+        Triangles at which the run was told to stop.
+    """
+
+    mesh: Prepared
+    record: CollapseRecord
+    original: Mesh
+    options: Options
+    least: int
+
+    def reaches(self, count: int) -> bool:
+        """Tell whether the level of so many triangles is in the record, or is out of the engine's reach anyway."""
+        left = int(self.record.faces_left[-1]) if len(self.record) else self.record.faces_before
+        return count >= self.least or left > self.least
+
+    def levels_steps(self, counts: Sequence[int], errors: Sequence[float], *,
+                     refit: bool | None = None) -> Generator[float, None, list[SimplifyResult]]:
+        """Make levels of these counts of triangles, or within these errors; yields the part that is done.
+
+        Parameters
+        ----------
+        counts, errors
+            One of both is empty.
+        refit : bool, optional
+            In place of the option.
+        """
+        options = self.options if refit is None else replace(self.options, refit=refit)
+        results: list[SimplifyResult] = []
+        for count in counts:
+            result = level(self.mesh, self.record, self.original, self.record.length_for(count), options)
+            results.append(judge_count(result, count, options))
+            yield len(results) / len(counts)
+        for error in errors:
+            results.append(within(self.mesh, self.record, self.original, error, options))
+            yield len(results) / len(errors)
+        return results
+
+
+def recording_steps(original: Mesh, options: Options, least: int) -> Generator[float, None, Recording]:
+    """Run the engine on a checked mesh down to so many triangles; yields progress from 0 to 1, may be closed.
+
+    Parameters
+    ----------
+    original : tuple of ndarray
+        Vertices (n, 3) float64 and faces (m, 3) int64.
+    options : Options
+    least : int
+    """
+    mesh = prepare(*original, join=options.weld, prune=options.prune)
+    blocks = Blocks(options.threads)
+    try:
+        yield 0.02
+        guide = guide_for(mesh, options) if options.method == "feature" else None
+        quadrics = initial_quadrics(mesh, options, blocks)
+        yield 0.12
+        run = collapse_steps(mesh.points, mesh.faces, quadrics, mesh.opened, None, least, options.rules, blocks, guide)
+        total = max(mesh.faces.shape[1] - least, 1)
+        record = yield from scaled(run, lambda left: 0.12 + 0.88 * (1 - (left - least) / total))
+    finally:
+        blocks.close()
+    return Recording(mesh, in_input_units(record, mesh, original[0]), original, options, least)
+
+
+def scaled(steps: Generator[Any, None, Value], scale: Any) -> Generator[float, None, Value]:  # noqa: ANN401
+    """Yield a function of what the steps yield; returns their result."""
+    while True:
+        try:
+            yield scale(next(steps))
+        except StopIteration as end:
+            return end.value
