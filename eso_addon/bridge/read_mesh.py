@@ -136,11 +136,7 @@ def _stored_mesh(obj: bpy.types.Object) -> Iterator[bpy.types.Mesh]:
 
 
 def _arrays_of(obj: bpy.types.Object, mesh: bpy.types.Mesh, transform: NDArray[np.float64]) -> MeshArrays:
-    mesh.calc_loop_triangles()
-    corners = np.zeros(len(mesh.loop_triangles) * 3, np.int32)
-    mesh.loop_triangles.foreach_get("loops", corners)
-    polygon = np.zeros(len(mesh.loop_triangles), np.int32)
-    mesh.loop_triangle_polygons.foreach_get("value", polygon)
+    corners, polygon = _triangulated(mesh)
     corner_vertex = _read_or(mesh, ".corner_vert", len(mesh.loops), np.int32)
     positions = read_attribute(mesh, "position")
     vertices = np.zeros((0, 3)) if positions is None else positions.astype(np.float64)
@@ -159,6 +155,18 @@ def _arrays_of(obj: bpy.types.Object, mesh: bpy.types.Mesh, transform: NDArray[n
         materials=tuple(material and material.original for material in mesh.materials),
         left_behind=names_left_behind(obj, mesh, corner_vertex),
     )
+
+
+def _triangulated(mesh: bpy.types.Mesh) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """Give the corners of Blender's triangles, (m * 3,), and the polygon of each, (m,)."""
+    if len(mesh.loops) == 3 * len(mesh.polygons):  # triangles already: what Blender would say, a good deal sooner
+        return np.arange(len(mesh.loops), dtype=np.int32), np.arange(len(mesh.polygons), dtype=np.int32)
+    mesh.calc_loop_triangles()
+    corners = np.zeros(len(mesh.loop_triangles) * 3, np.int32)
+    mesh.loop_triangles.foreach_get("loops", corners)
+    polygon = np.zeros(len(mesh.loop_triangles), np.int32)
+    mesh.loop_triangle_polygons.foreach_get("value", polygon)
+    return corners, polygon
 
 
 def _read_or(mesh: bpy.types.Mesh, name: str, count: int, dtype: type) -> NDArray:

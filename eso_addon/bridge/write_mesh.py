@@ -59,8 +59,16 @@ def write_mesh(result: Simplified, source: MeshArrays, name: str) -> bpy.types.M
     if len(result.faces):
         _write_faces(mesh, result, source)
     mesh.update(calc_edges=True)
-    mesh.validate()  # drops faces with the same three vertices: Blender has no place for them
+    if _has_twins(result.faces):
+        mesh.validate()  # drops faces with the same three vertices: Blender has no place for them
     return mesh
+
+
+def _has_twins(faces: NDArray[np.int32]) -> bool:
+    """Tell whether faces share all three vertices; looking is ten times as quick as Blender's validation."""
+    low, middle, high = np.sort(faces, axis=1).astype(np.uint64).T
+    keys = np.sort((low * np.uint64(0x9E3779B97F4A7C15) + middle) * np.uint64(0xC2B2AE3D27D4EB4F) + high)
+    return bool((keys[1:] == keys[:-1]).any())  # or one in a billion others
 
 
 def _in_object_space(vertices: NDArray[np.float64], transform: NDArray[np.float64]) -> NDArray[np.float32]:

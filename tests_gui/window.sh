@@ -1,0 +1,16 @@
+#!/bin/bash
+# SPDX-License-Identifier: GPL-3.0-or-later
+# window.sh ZIP SCRIPT WxH SECONDS [WORDS...]: install the add-on in a fresh user folder, open Blender, run the script in it.
+# Reads GUI_BLENDER and GUI_OUT. Called by scripts/gui_blender.sh, on this machine or in the Debian it has made.
+set -euo pipefail
+zip=$1 script=$2 size=$3 seconds=$4; shift 4
+export BLENDER_USER_RESOURCES=$GUI_OUT/user
+"$GUI_BLENDER" --command extension install-file -r user_default --enable "$zip"
+if [ -z "${DISPLAY:-}" ]; then
+    export LIBGL_ALWAYS_SOFTWARE=1 GALLIUM_DRIVER=llvmpipe DISPLAY=:99
+    Xvfb :99 -screen 0 "${size}x24" +extension GLX -nolisten tcp >"$GUI_OUT/screen.log" 2>&1 & screen=$!
+    trap 'kill $screen 2>/dev/null || true' EXIT
+    for _ in $(seq 100); do [ -S /tmp/.X11-unix/X99 ] && break; sleep 0.1; done
+fi
+timeout "$seconds" "$GUI_BLENDER" --enable-event-simulate --window-geometry 0 0 "${size%x*}" "${size#*x}" --python-exit-code 3 \
+    --python-expr 'import bpy; bpy.context.preferences.view.show_splash = False' --python "$script" -- "$@"
