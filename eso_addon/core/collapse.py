@@ -98,6 +98,25 @@ class Guide(Protocol):
         """Return the collapses of the batch that must not be done beside the others."""
 
 
+class Lines(Protocol):
+    """Edges that are simplified along themselves, and never across."""
+
+    def lock(self, vertices: Bools) -> None:
+        """Keep these vertices, (n,) bool, where they are."""
+
+    def holds(self, one: Ints, other: Ints) -> tuple[Bools, Bools]:
+        """Tell which end of each edge must stay where it is; where both must, the edge may not go."""
+
+    def clashes(self, survivor: Ints, label: Ints) -> Ints:
+        """Return the collapses of the batch after which two lines would be one."""
+
+    def follow(self, survivor: Ints) -> None:
+        """Take note of a batch that was carried out."""
+
+    def release(self, faces_left: int) -> bool:
+        """Give the lines up, where nothing else can go; tell whether that changes anything."""
+
+
 @dataclass
 class _State:
     """The mesh on its way down; n vertices in Morton order, m faces, and a vertex n for dead faces."""
@@ -112,6 +131,7 @@ class _State:
     locked: Bools | None  # (n,)
     alive: int
     guide: Guide | None = None
+    lines: Lines | None = None
     costs: np.ndarray = field(init=False)  # (3, m) float32
     base: np.ndarray = field(init=False)  # (3, m) float32, costs before the curvature factor
     dead: int = 0
@@ -130,6 +150,11 @@ class _State:
         self.survivor = np.arange(count + 1)
         self.owner = np.zeros(4 * count + 8, np.int64)
 
+
+    @property
+    def holding(self) -> bool:
+        """Whether some vertices may not move."""
+        return self.locked is not None or self.lines is not None
 
     @property
     def nowhere(self) -> int:
@@ -175,7 +200,7 @@ _Links = tuple[Ints, Ints, Ints, Ints]
 
 def collapse_steps(points: Floats, faces: Ints, quadrics: Floats, boundary: Bools, locked: Bools | None, target: int,
                    rules: Rules, blocks: Blocks,
-                   guide: Guide | None = None) -> Generator[int, None, CollapseRecord]:
+                   guide: Guide | None = None, lines: Lines | None = None) -> Generator[int, None, CollapseRecord]:
     """Collapse edges until `target` faces are left or nothing more can go.
 
     Parameters
@@ -194,6 +219,8 @@ def collapse_steps(points: Floats, faces: Ints, quadrics: Floats, boundary: Bool
     blocks : Blocks
     guide : Guide, optional
         Weighs in place of the quadrics, which may then be zeros; with endpoint placement only.
+    lines : Lines, optional
+        Says what may go along them; of no use beside a guide.
 
     Yields
     ------
@@ -211,9 +238,11 @@ def collapse_steps(points: Floats, faces: Ints, quadrics: Floats, boundary: Bool
     if (fans > 1).any():  # boundaries meet there: such vertices stay where they are
         locked = (fans[:-1] > 1) if locked is None else locked | (fans[:-1] > 1)
     state = _State(rules, blocks, rows, quadrics.copy(), faces.copy(), np.append(boundary, False), fans, locked,
-                   faces.shape[1], guide)
+                   faces.shape[1], guide, lines)
     if guide is not None and locked is not None:
         guide.hold(locked)
+    if lines is not None and locked is not None:
+        lines.lock(locked)
     history: list[tuple] = []
     faces_before = state.alive
     _weigh(state)
@@ -221,7 +250,7 @@ def collapse_steps(points: Floats, faces: Ints, quadrics: Floats, boundary: Bool
     while state.alive > target:
         batch = _choose(state)
         if batch is None:
-            if fresh:
+            if fresh and (state.lines is None or not state.lines.release(state.alive)):
                 break
             _weigh(state)  # rejected edges may have become possible
             fresh = True
@@ -258,22 +287,31 @@ def _counts(state: _State, start: Ints, end: Ints) -> Bools:
 
 
 def _edge_costs(state: _State, one: Ints, other: Ints) -> np.ndarray:
-    locked = state.locked
     if state.guide is not None:
         return np.zeros(len(one), np.float32)  # the guide adds its costs to what was not rejected
     if state.rules.endpoint:
         at_one, at_other = endpoint_costs(state.quadrics, state.points, one, other)
-        if locked is not None:
-            at_other[locked.take(one)] = np.inf
-            at_one[locked.take(other)] = np.inf
+        if state.holding:
+            holds_one, holds_other = _holds(state, one, other)
+            at_other[holds_one] = np.inf
+            at_one[holds_other] = np.inf
         return np.minimum(at_one, at_other)
     costs = optimal_costs(state.quadrics, one, other)
-    if locked is not None:
-        held = np.flatnonzero(locked.take(one) | locked.take(other))
+    if state.holding:
+        holds_one, holds_other = _holds(state, one, other)
+        held = np.flatnonzero(holds_one | holds_other)
         at_one, at_other = endpoint_costs(state.quadrics, state.points, one.take(held), other.take(held))
-        holds_one, holds_other = locked.take(one.take(held)), locked.take(other.take(held))
+        holds_one, holds_other = holds_one.take(held), holds_other.take(held)
         costs[held] = np.where(holds_one, np.where(holds_other, np.inf, at_one), at_other)
     return costs
+
+
+def _holds(state: _State, one: Ints, other: Ints) -> tuple[Bools, Bools]:
+    """Tell which end of each edge may not move; where neither may, the edge may not go."""
+    if state.lines is not None:
+        return state.lines.holds(one, other)
+    assert state.locked is not None
+    return state.locked.take(one), state.locked.take(other)
 
 
 def _apply_factor(state: _State) -> None:
@@ -405,8 +443,8 @@ def _stays(state: _State, one: Ints, other: Ints) -> tuple[Bools, Bools]:
     if state.rules.endpoint:
         at_one, at_other = endpoint_costs(state.quadrics, state.points, one, other)
         swap = at_other < at_one
-    if state.locked is not None:
-        holds_one, holds_other = state.locked.take(one), state.locked.take(other)
+    if state.holding:
+        holds_one, holds_other = _holds(state, one, other)
         stays |= holds_one | holds_other
         swap = np.where(holds_one | holds_other, holds_other, swap)
     return swap, stays
@@ -428,12 +466,13 @@ def _test(state: _State, batch: _Batch) -> None:
         rejected[flipped] = True
     if state.rules.guard:
         rejected |= _broken(state, batch, [links for _, _, _, links in tested])
-    if state.guide is not None:
-        rejected[state.guide.clashes(state.survivor, state.label)] = True
+    bound = state.guide or state.lines
+    if bound is not None:
+        rejected[bound.clashes(state.survivor, state.label)] = True
     while rejected.any():
         rejected = _reject(state, batch, rejected)
-        if state.guide is not None and not rejected.any():
-            rejected[state.guide.clashes(state.survivor, state.label)] = True
+        if bound is not None and not rejected.any():
+            rejected[bound.clashes(state.survivor, state.label)] = True
 
 
 def _touched(state: _State, part: slice) -> _Touched:
@@ -597,6 +636,8 @@ def _collapse(state: _State, batch: _Batch, target: int) -> tuple | None:
         state.fans[vertices] += state.fans.take(gone[part]) - (batch.falling.take(chosen[part]) == 1)
 
     state.blocks.map(carry_out, len(chosen), _BLOCK // 4)
+    if state.lines is not None:
+        state.lines.follow(state.survivor)
     _update(state, batch)
     state.base.ravel()[failed] = np.inf
     state.label[kept], state.label[gone] = ~kept, ~gone
