@@ -9,7 +9,7 @@ from ..bridge.write_mesh import write_mesh
 from ..core.simplify import SimplifyResult, lod_chain_steps
 from ..jobs.modal import EngineOperator
 from ..jobs.worker import Steps
-from ..settings.options import LodOptions
+from ..settings.lod_options import LodOptions
 from .polls import poll_with, why_not_simplify
 from .probing import with_errors
 from .reports import notes_of, tell

@@ -6,9 +6,7 @@
 from typing import Any
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
-
-from ..core.mesh import MeshError
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
 
 _TARGETS = (
     ("ratio", "Ratio", "Keep this share of the triangles"),
@@ -132,58 +130,3 @@ class SimplifyOptions(EngineOptions):
     def expected_triangles(self, now: int) -> int | None:
         """Give the triangles that the target asks for, None if only the engine can tell."""
         return {"ratio": round(now * self.ratio), "count": min(now, self.faces_target), "error": None}[self.target]
-
-
-class LodOptions(EngineOptions):
-    """A chain of levels."""
-
-    levels_by: EnumProperty(name="Levels By", items=_TARGETS, default="ratio")
-    ratios: StringProperty(
-        name="Ratios",
-        description="Share of the triangles at each level, such as 0.5, 0.25, 0.1",
-        default="0.5, 0.25, 0.1",
-    )
-    faces_targets: StringProperty(
-        name="Triangles", description="Triangles of each level, such as 8000, 2000, 500", default="8000, 2000, 500"
-    )
-    max_errors: StringProperty(
-        name="Errors",
-        description="Largest deviation of each level in the scene's units, such as 0.001, 0.01",
-        default="0.001, 0.01",
-    )
-    collection: StringProperty(
-        name="Collection", description="Where the levels go; empty: a collection named after the object", default=""
-    )
-    replace: BoolProperty(
-        name="Replace Earlier",
-        description="Remove the levels made earlier from this object in the same collection",
-        default=True,
-    )
-
-    def draw_levels(self, layout: bpy.types.UILayout) -> None:
-        """Draw the levels' kind, their list, and where they go."""
-        layout.row(align=True).prop(self, "levels_by", expand=True)
-        layout.prop(self, {"ratio": "ratios", "count": "faces_targets", "error": "max_errors"}[self.levels_by])
-        layout.prop_search(self, "collection", bpy.data, "collections")
-        layout.prop(self, "replace")
-
-    def lod_targets(self) -> dict[str, Any]:
-        """Give the targets as `lod_chain` takes them, finest first."""
-        if self.levels_by == "count":
-            return {"faces_targets": sorted(map(int, _numbers(self.faces_targets, whole=True)), reverse=True)}
-        if self.levels_by == "error":
-            return {"max_errors": sorted(_numbers(self.max_errors))}
-        return {"ratios": sorted(_numbers(self.ratios), reverse=True)}
-
-
-def _numbers(text: str, *, whole: bool = False) -> list[float]:
-    """Read numbers separated by commas."""
-    words = text.replace(";", ",").replace(",", " ").split()
-    example = "8000, 2000, 500" if whole else "0.5, 0.25, 0.1"
-    try:
-        numbers = [float(int(word)) if whole else float(word) for word in words]
-    except ValueError:
-        numbers = []
-    if not numbers:
-        raise MeshError(f"levels '{text}' cannot be read: write numbers with commas between, such as {example}")
-    return numbers

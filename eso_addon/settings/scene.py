@@ -6,7 +6,8 @@
 import bpy
 from bpy.props import PointerProperty, StringProperty
 
-from .options import LodOptions, SimplifyOptions
+from .lod_options import LodOptions
+from .options import SimplifyOptions
 
 
 class ESO_PG_settings(SimplifyOptions, LodOptions, bpy.types.PropertyGroup):

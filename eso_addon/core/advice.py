@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What would help a level that stopped short of its target."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .adjacency import vertex_components
+from .levels import SimplifyResult
+from .mesh import Floats, Ints, weld
+
+
+def prune_for(result: SimplifyResult, target: int) -> tuple[float, int] | None:
+    """Find the size of parts to prune so that a level gets down to its target.
+
+    Parameters
+    ----------
+    result : SimplifyResult
+        A level with more triangles than asked for.
+    target : int
+        Triangles that were asked for.
+
+    Returns
+    -------
+    (float, int) or None
+        The value for `prune`, in the mesh's units, and how many parts it drops; None where even dropping all parts
+        but the largest would not do.
+    """
+    vertices, faces = result.original
+    part = vertex_components(weld(vertices).take(faces), len(vertices)).take(weld(vertices).take(faces[:, 0]))
+    _, part = np.unique(part, return_inverse=True)
+    sizes = _diagonals(vertices, faces, part)
+    order = np.argsort(sizes, kind="stable")
+    kept = np.bincount(part.take(result.face_map), minlength=len(sizes)).take(order)
+    left = len(result.faces) - np.cumsum(kept)  # without the parts up to this one
+    sizes = sizes.take(order)
+    # a size tells only parts apart that differ by more than rounding
+    possible = np.flatnonzero((left[:-1] <= target) & (sizes[1:] > sizes[:-1] * (1 + 1e-6)))
+    if not len(possible):
+        return None
+    last = int(possible[0])
+    return _short_number_between(float(sizes[last]), float(sizes[last + 1])), last + 1
+
+
+def _diagonals(vertices: Floats, faces: Ints, part: Ints) -> Floats:
+    """Return the diagonal of each part's bounding box."""
+    count = int(part.max(initial=-1)) + 1
+    square = np.zeros(count)
+    for axis in range(3):
+        values = vertices[:, axis].take(faces)
+        low, high = np.full(count, np.inf), np.full(count, -np.inf)
+        np.minimum.at(low, part, values.min(axis=1))
+        np.maximum.at(high, part, values.max(axis=1))
+        square += (high - low) ** 2
+    return np.sqrt(square)
+
+
+def _short_number_between(low: float, high: float) -> float:
+    """Return the number with the fewest digits above one number and at most another."""
+    for digits in range(1, 17):
+        short = float(f"{low * (1 - 10.0**-digits) + high * 10.0**-digits:.{digits}g}")
+        for number in (float(f"{(low + high) / 2:.{digits}g}"), short, float(f"{high:.{digits}g}")):
+            if low < number <= high:
+                return number
+    return high

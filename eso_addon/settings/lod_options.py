@@ -1,0 +1,166 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+# Blender reads properties from annotations that are calls:
+# mypy: disable-error-code="valid-type"
+"""The options of a chain of levels as Blender properties, once, for the panel and for the operators."""
+
+from typing import Any
+
+import bpy
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
+
+from ..core.mesh import MeshError
+from ..core.screen import Screen
+from .options import EngineOptions
+from .profiles import PROFILES
+
+_SCOPES = (
+    ("SELECTED", "Selected", "Levels of every selected mesh, and of the meshes that selected empties instance"),
+    ("COLLECTION", "Collection", "Levels of every mesh in a collection"),
+)
+_LEVELS_BY = (
+    ("ratio", "Ratio", "Share of each mesh's triangles"),
+    ("count", "Count", "Triangles of each mesh"),
+    ("error", "Error", "Largest deviation"),
+    ("screen", "Screen", "Sizes on screen, in pixels, at which nobody sees a difference"),
+    ("budget", "Budget", "Triangles of all meshes together, spent where they matter most"),
+)
+_LIST_OF = {"ratio": "ratios", "count": "faces_targets", "error": "max_errors", "screen": "screen_sizes",
+            "budget": "budgets"}
+_PROFILES = tuple((name, profile.label, f"Names and layout for {profile.label}") for name, profile in PROFILES.items())
+
+
+class LodOptions(EngineOptions):
+    """A chain of levels."""
+
+    levels_by: EnumProperty(name="Levels By", items=_LEVELS_BY, default="ratio")
+    ratios: StringProperty(
+        name="Ratios",
+        description="Share of the triangles at each level, such as 0.5, 0.25, 0.1",
+        default="0.5, 0.25, 0.1",
+    )
+    faces_targets: StringProperty(
+        name="Triangles", description="Triangles of each level, such as 8000, 2000, 500", default="8000, 2000, 500"
+    )
+    max_errors: StringProperty(
+        name="Errors",
+        description="Largest deviation of each level in the scene's units, such as 0.001, 0.01",
+        default="0.001, 0.01",
+    )
+    screen_sizes: StringProperty(
+        name="Sizes",
+        description="Pixels of the longest side on screen where each level begins, such as 800, 400, 100",
+        default="800, 400, 100",
+    )
+    budgets: StringProperty(
+        name="Triangles in All",
+        description="Triangles of all meshes together at each level, such as 100000, 25000",
+        default="100000, 25000",
+    )
+    pixel_error: FloatProperty(
+        name="Pixels", description="Largest error that may be seen, in pixels", default=1.0, min=0.01, soft_max=10.0
+    )
+    resolution: IntProperty(
+        name="Resolution", description="Pixels along the wider side of the picture", default=1920, min=1, max=100_000
+    )
+    lens: FloatProperty(
+        name="Lens", description="Focal length in millimetres, on a sensor 36 mm wide", default=50.0, min=1.0,
+        soft_max=250.0,
+    )
+    profile: EnumProperty(name="Profile", items=_PROFILES, default="plain")
+    scope: EnumProperty(name="Of", items=_SCOPES, default="SELECTED")
+    source_collection: StringProperty(
+        name="Meshes In", description="The collection whose meshes get levels; empty: the active one", default=""
+    )
+    collection: StringProperty(
+        name="Collection", description="Where the levels go; empty: a collection named after the object", default=""
+    )
+    replace: BoolProperty(
+        name="Replace Earlier",
+        description="Make the levels that this object has anew, in place; otherwise they stay beside the new ones",
+        default=True,
+    )
+    live_mirror: BoolProperty(
+        name="Mirror Stays Live", description="Simplify one half; the levels keep the Mirror modifier", default=False
+    )
+    live_subdivision: BoolProperty(
+        name="Subdivision Stays Live",
+        description="Simplify the cage; the levels keep the Subdivision Surface modifier",
+        default=False,
+    )
+
+    def draw_levels(self, layout: bpy.types.UILayout) -> None:
+        """Draw the levels' kind, their list, and where they go."""
+        layout.prop(self, "levels_by")
+        layout.prop(self, _LIST_OF[self.levels_by])
+        if self.levels_by == "screen":
+            for name in ("pixel_error", "resolution", "lens"):
+                layout.prop(self, name)
+        layout.prop(self, "profile")
+        layout.prop(self, "scope")
+        if self.scope == "COLLECTION":
+            layout.prop_search(self, "source_collection", bpy.data, "collections")
+        layout.prop_search(self, "collection", bpy.data, "collections")
+        layout.prop(self, "replace")
+        column = layout.column()
+        column.active = self.apply_modifiers
+        column.prop(self, "live_mirror")
+        column.prop(self, "live_subdivision")
+
+    def level_goals(self) -> tuple[str, list[float]]:
+        """Give the kind of the levels and a number for each, the finest first.
+
+        Raises
+        ------
+        MeshError
+            The list cannot be read, names a level twice, or has more levels than the profile takes.
+        """
+        text, kind = getattr(self, _LIST_OF[self.levels_by]), self.levels_by
+        goals = ordered_goals(kind, _numbers(text, whole=kind in ("count", "budget")))
+        reason = PROFILES[self.profile].why_not(len(goals))
+        if reason:
+            raise MeshError(reason)
+        return kind, goals
+
+    def lod_targets(self) -> dict[str, Any]:
+        """Give the targets as `lod_chain` takes them, finest first."""
+        kind, goals = self.level_goals()
+        name = {"ratio": "ratios", "error": "max_errors"}.get(kind, "faces_targets")
+        return {name: list(map(int, goals)) if name == "faces_targets" else goals}
+
+    def screen(self) -> Screen:
+        """Give the picture in which errors are judged."""
+        return Screen(resolution=self.resolution, lens=self.lens, pixels=self.pixel_error)
+
+    @property
+    def live_types(self) -> set[str]:
+        """The kinds of modifiers that stay live on the levels."""
+        wanted = {"MIRROR": self.live_mirror, "SUBSURF": self.live_subdivision}
+        return {"ARMATURE", *(kind for kind, is_wanted in wanted.items() if is_wanted)}
+
+
+def ordered_goals(kind: str, goals: list[float]) -> list[float]:
+    """Put levels in order, the finest first.
+
+    Raises
+    ------
+    MeshError
+        Two levels are the same.
+    """
+    ordered = sorted(goals, reverse=kind != "error")
+    for finer, coarser in zip(ordered, ordered[1:], strict=False):
+        if finer == coarser:
+            raise MeshError(f"level {finer:g} is there twice: each level must be coarser than the one before")
+    return ordered
+
+
+def _numbers(text: str, *, whole: bool = False) -> list[float]:
+    """Read numbers separated by commas."""
+    words = text.replace(";", ",").replace(",", " ").split()
+    example = "8000, 2000, 500" if whole else "0.5, 0.25, 0.1"
+    try:
+        numbers = [float(int(word)) if whole else float(word) for word in words]
+    except (ValueError, OverflowError):
+        numbers = []
+    if not numbers:
+        raise MeshError(f"levels '{text}' cannot be read: write numbers with commas between, such as {example}")
+    return numbers
