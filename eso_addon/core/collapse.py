@@ -175,6 +175,7 @@ class _Batch:
     stays: Bools
     bad: Bools
     at_boundary: Bools
+    unsure: Bools  # refused beside a cheaper one that was refused too: they may pass without it
     falling: Ints = field(init=False)
     touched: list["_Touched"] = field(default_factory=list)
 
@@ -403,7 +404,8 @@ def _place(state: _State, slot: Ints, cost: np.ndarray) -> _Batch:
     one, other = _ends(state.faces, slot)
     count = len(slot)
     batch = _Batch(one, other, slot, cost, np.empty((count, state.quadrics.shape[1])), np.zeros((count, 4)),
-                   np.zeros(count, bool), np.zeros(count, bool), state.boundary.take(one) | state.boundary.take(other))
+                   np.zeros(count, bool), np.zeros(count, bool), state.boundary.take(one) | state.boundary.take(other),
+                   np.zeros(count, bool))
 
     def merge(part: slice) -> None:
         one, other = batch.one[part], batch.other[part]
@@ -603,6 +605,7 @@ def _reject(state: _State, batch: _Batch, rejected: Bools) -> Bools:
     for touched in batch.touched:
         hit = outcast.take(touched.label.take(touched.mixed, axis=1) + 1, mode="clip").any(axis=0)
         face = touched.mixed.compress(hit)
+        batch.unsure[_after_another(touched.label.take(face, axis=1), outcast)] = True
         label = state.label.take(touched.corner.take(face, axis=1))
         touched.label[:, face] = label
         touched.gone[face] = _removers(label)
@@ -616,13 +619,20 @@ def _reject(state: _State, batch: _Batch, rejected: Bools) -> Bools:
     return failed & ~batch.bad
 
 
+def _after_another(label: Ints, outcast: Bools) -> Ints:
+    """Return the outcasts that were tested after another outcast at the same face."""
+    out = np.where(outcast.take(label + 1, mode="clip"), label, _NONE)
+    return out[(out > out.min(axis=0)) & (out < _NONE)]
+
+
 def _collapse(state: _State, batch: _Batch, target: int) -> tuple | None:
     """Carry out the batch, as far as the target asks, and renew what it touched."""
     falling = np.where(batch.bad, 0, batch.falling)
     removed = np.cumsum(falling)
     late = np.zeros(len(removed), bool)
     late[np.searchsorted(removed, state.alive - target) + 1 :] = True
-    failed = batch.slot[batch.bad]
+    # where all failed nothing but this tells that the unsure ones are left to try
+    failed = batch.slot[batch.bad & ~(batch.unsure & batch.bad.all())]
     _withdraw(state, batch, late & ~batch.bad)
     chosen = np.flatnonzero(~batch.bad)
     kept, gone, places = batch.one.take(chosen), batch.other.take(chosen), batch.places.take(chosen, axis=0)

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
@@ -208,6 +208,7 @@ def engine_mesh(mesh: Mesh) -> Mesh:
 
 @settings(max_examples=40, deadline=None)
 @given(seeds, epsilons)
+@example(1418946, -0.5)  # the last batch failed as a whole, one collapse of it only beside another
 def test_every_collapse_keeps_the_rules_and_nothing_is_left_to_do(seed: int, epsilon: float | None) -> None:
     mesh = engine_mesh(shapes.manifold(seed))
     result = simplify(*shapes.manifold(seed), method="feature", epsilon=epsilon, weld=False, threads=1)
