@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import math
 import struct
 import zlib
 from dataclasses import dataclass, field
@@ -19,7 +20,8 @@ _FIXED = struct.Struct("<8sHHIII")  # magic, version, flags, bytes of header and
 _LARGEST_HEADER = 1 << 24
 # a reader must know all of these to understand a file
 FEATURES = ("wedges", "attributes", "extra-faces", "edges", "turned", "quantised")
-_ROW = np.dtype([("length", "<u4"), ("checksum", "<u4"), ("places", "<u4"), ("faces", "<u4"), ("error", "<f4")])
+_ROW = np.dtype([("length", "<u4"), ("checksum", "<u4"), ("places", "<u4"), ("faces", "<u4"), ("error", "<f4"),
+                 ("mesh", "<u4")])
 # no place can be coded in fewer bits than this many a byte allows: larger counts are damage
 _PLACES_A_BYTE = 4096
 
@@ -31,11 +33,12 @@ class Container:
     Attributes
     ----------
     header : dict
-    table : ndarray of rows (length, checksum, places, faces, error)
-        Base first, then the batches; places and faces after each block.
+    table : ndarray of rows (length, checksum, places, faces, error, mesh)
+        The base of each mesh first, then the batches of all; places and faces of its mesh after each block.
     blocks : list of bytes
         As many of them as were there whole.
     optional : dict of bytes
+        By name and mesh.
     damage : str
         Why blocks are missing, empty where none is.
     """
@@ -43,14 +46,14 @@ class Container:
     header: dict[str, Any]
     table: np.ndarray
     blocks: list[bytes]
-    optional: dict[str, bytes] = field(default_factory=dict)
+    optional: dict[tuple[str, int], bytes] = field(default_factory=dict)
     damage: str = ""
 
 
 def write(container: Container) -> bytes:
     """Return the bytes of a file."""
     header = dict(container.header)
-    header["optional"] = [[name, len(data), zlib.crc32(data)] for name, data in container.optional.items()]
+    header["optional"] = [[*key, len(data), zlib.crc32(data)] for key, data in container.optional.items()]
     text = _deflate(json.dumps(header, separators=(",", ":"), sort_keys=True).encode())
     planes = container.table.view(np.uint8).reshape(len(container.table), -1).T.tobytes()
     table = struct.pack("<I", len(container.table)) + _deflate(planes)
@@ -59,12 +62,13 @@ def write(container: Container) -> bytes:
     return b"".join([fixed, text, table, *container.blocks, *container.optional.values()])
 
 
-def make_table(blocks: list[bytes], places: np.ndarray, faces: np.ndarray, errors: np.ndarray) -> np.ndarray:
+def make_table(blocks: list[bytes], places: np.ndarray, faces: np.ndarray, errors: np.ndarray,
+               meshes: np.ndarray) -> np.ndarray:
     """Return the table of some blocks."""
     table = np.zeros(len(blocks), _ROW)
     table["length"] = [len(block) for block in blocks]
     table["checksum"] = [zlib.crc32(block) for block in blocks]
-    table["places"], table["faces"], table["error"] = places, faces, errors
+    table["places"], table["faces"], table["error"], table["mesh"] = places, faces, errors, meshes
     return table
 
 
@@ -94,7 +98,7 @@ def read(data: bytes, *, partial: bool) -> Container:
     if len(text) < header_size or len(table_bytes) < table_size or zlib.crc32(text + table_bytes) != checksum:
         raise StreamError("the header of the stream is damaged: fetch the file again")
     header = _header(text)
-    table = _table(table_bytes)
+    table = _table(table_bytes, len(header["meshes"]))
     position = begin + header_size + table_size
     container = Container(header, table, [])
     if table["length"].astype(np.int64).sum() * _PLACES_A_BYTE + 4096 < int(table["places"].max()):
@@ -108,14 +112,14 @@ def read(data: bytes, *, partial: bool) -> Container:
         container.blocks.append(block)
         position += len(block)
     if container.damage:
-        if not partial or not container.blocks:
+        if not partial or len(container.blocks) < len(header["meshes"]):
             raise StreamError(container.damage + ("" if partial else ", or ask for what is whole of it (partial)"))
         return container
     return _optional(container, data, position, partial)
 
 
 def _optional(container: Container, data: bytes, position: int, partial: bool) -> Container:
-    for name, length, checksum in container.header["optional"]:
+    for name, mesh, length, checksum in container.header["optional"]:
         block = data[position : position + length]
         position += length
         if len(block) < length or zlib.crc32(block) != checksum:
@@ -123,7 +127,7 @@ def _optional(container: Container, data: bytes, position: int, partial: bool) -
             if not partial:
                 raise StreamError(container.damage + ", or ask for what is whole of it (partial)")
             return container
-        container.optional[name] = block
+        container.optional[name, mesh] = block
     if position < len(data):
         container.damage = "the stream is followed by bytes that do not belong to it: fetch the file again"
         if not partial:
@@ -151,27 +155,44 @@ def inflate(data: bytes, limit: int) -> bytes:
 def _header(text: bytes) -> dict[str, Any]:
     try:
         header = json.loads(inflate(text, _LARGEST_HEADER))
-        needs = header["needs"]
-        for name, kind in (("places", int), ("faces", int), ("extra", int), ("edges", int), ("vertices", int),
-                           ("wedges", int), ("lanes", int), ("grid", list), ("attributes", list),
-                           ("optional", list), ("hash", str)):
-            if type(header[name]) is not kind or (kind is int and not 0 <= header[name] < 1 << 31):
+        unknown = set().union(*(_check_entry(entry) for entry in header["meshes"]))
+        if not header["meshes"]:
+            raise TypeError
+        _check_objects(header.get("meta", {}), len(header["meshes"]))
+        for name, mesh, length, checksum in header["optional"]:
+            if not (isinstance(name, str) and all(type(number) is int for number in (mesh, length, checksum))
+                    and length >= 0):
                 raise TypeError
-        unknown = sorted(set(needs) - set(FEATURES))
-        for name, length, checksum in header["optional"]:
-            if not (isinstance(name, str) and type(length) is int and type(checksum) is int and length >= 0):
-                raise TypeError
-    except (ValueError, KeyError, TypeError, RecursionError) as error:
+    except (ValueError, KeyError, TypeError, RecursionError, AttributeError) as error:
         if isinstance(error, StreamError):
             raise
         raise StreamError("the header of the stream says nothing sensible: fetch the file again") from None
     if unknown:
-        names = ", ".join(map(str, unknown))
+        names = ", ".join(sorted(map(str, unknown)))
         raise StreamError(f"the stream needs what this reader does not know ({names}): update it")
     return header
 
 
-def _table(data: bytes) -> np.ndarray:
+def _check_objects(meta: dict[str, Any], meshes: int) -> None:
+    for entry in meta.get("objects", []):
+        if not (isinstance(entry["name"], str) and type(entry["mesh"]) is int and 0 <= entry["mesh"] < meshes):
+            raise TypeError
+        if len(entry["matrix"]) != 16 or not all(math.isfinite(number) for number in entry["matrix"]):
+            raise ValueError
+
+
+def _check_entry(entry: dict[str, Any]) -> set:
+    """Check a mesh's entry of the header; return what it needs and is not known."""
+    for name, kind in (("places", int), ("faces", int), ("extra", int), ("edges", int), ("vertices", int),
+                       ("wedges", int), ("lanes", int), ("grid", list), ("attributes", list), ("hash", str)):
+        if type(entry[name]) is not kind or (kind is int and not 0 <= entry[name] < 1 << 31):
+            raise TypeError
+    if not isinstance(entry.get("meta", {}), dict):
+        raise TypeError
+    return set(entry["needs"]) - set(FEATURES)
+
+
+def _table(data: bytes, meshes: int) -> np.ndarray:
     if len(data) < 4:
         raise StreamError("the table of the stream is damaged: fetch the file again")
     (rows,) = struct.unpack_from("<I", data)
@@ -181,7 +202,11 @@ def _table(data: bytes) -> np.ndarray:
     if len(raw) != rows * _ROW.itemsize:
         raise StreamError("the table of the stream is damaged: fetch the file again")
     table = np.ascontiguousarray(np.frombuffer(raw, np.uint8).reshape(-1, rows).T).view(_ROW).ravel()
+    order = np.argsort(table["mesh"], kind="stable")
+    change = np.diff(table["mesh"][order].astype(np.int64))
+    wrong = not np.array_equal(table["mesh"][:meshes], np.arange(meshes)) or int(table["mesh"].max()) >= meshes
     for name in ("places", "faces"):
-        if (np.diff(table[name].astype(np.int64)) < 0).any():
-            raise StreamError("the table of the stream is damaged: fetch the file again")
+        wrong |= bool(((np.diff(table[name][order].astype(np.int64)) < 0) & (change == 0)).any())
+    if wrong:
+        raise StreamError("the table of the stream is damaged: fetch the file again")
     return table

@@ -269,12 +269,14 @@ class _Numbering:
         number = np.zeros(len(vertex_order), np.int64)
         number[vertex_order] = np.arange(len(vertex_order))
         edges = np.sort(number.take(source.edges), axis=1)
-        result.edges = edges[np.lexsort((edges[:, 1], edges[:, 0]))]
+        edge_order = np.lexsort((edges[:, 1], edges[:, 0]))
+        result.edges = edges[edge_order]
         all_corners = np.concatenate((beside_corner, corners), axis=1)
         corner_of = source.wedge_corner.take(wedges)
         for domain, named in source.attributes.items():
+            orders = {"vertex": vertex_order, "face": face_order, "edge": edge_order}
             result.attributes[domain] = {
-                name: _reordered(domain, array, vertex_order, corner_of, face_order, all_corners)
+                name: array[orders[domain]] if domain in orders else _of_corners(domain, array, corner_of, all_corners)
                 for name, array in named.items()}
         return result
 
@@ -303,13 +305,8 @@ class _Numbering:
         return parents
 
 
-def _reordered(domain: str, array: np.ndarray, vertex_order: Ints, wedge_corner: Ints, face_order: Ints,
-               corners: Ints) -> np.ndarray:
+def _of_corners(domain: str, array: np.ndarray, wedge_corner: Ints, corners: Ints) -> np.ndarray:
     """Put an attribute in the stream's order: corners' by wedge, sides' as rows of three."""
-    if domain == "vertex":
-        return array[vertex_order]
-    if domain == "face":
-        return array[face_order]
     flat = array.reshape(-1, *array.shape[2:])
     if domain == "side":
         return flat[corners.T]

@@ -16,11 +16,11 @@ from numpy.typing import ArrayLike
 from ..core.mesh import Ints, MeshError
 from ..files.atomic import atomic_output
 from .errors import StreamError
+from .finest import finest, side_rows
+from .mesh_codec import EncodedMesh, encode_mesh
 from .patches import Patches, make_patches
 from .source import Attributes, make_source
-from .stream import decode, encode, finest, side_rows
-
-_DOMAINS = ("vertex", "corner", "face", "side")
+from .stream import decode, encode
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Level:
     edges : ndarray, (l, 2) int32
         Loose edges.
     attributes : dict of dict of ndarray
-        By domain ("vertex", "corner", "face", "side") and name.
+        By domain ("vertex", "corner", "face", "side", "edge") and name.
     """
 
     vertices: np.ndarray
@@ -56,9 +56,10 @@ class Progressive:
         What was wrong with a file that was loaded in part; empty where nothing was.
     """
 
-    def __init__(self, patches: Patches, meta: dict[str, Any], damage: str = "", file: bytes | None = None) -> None:
+    def __init__(self, patches: Patches, meta: dict[str, Any], damage: str = "",
+                 encoded: EncodedMesh | None = None) -> None:
         self._patches = patches
-        self._file = file
+        self._encoded = encoded
         self.meta = meta
         self.damage = damage
 
@@ -86,6 +87,17 @@ class Progressive:
     def batch_faces(self) -> Ints:
         """Triangles of the base and after each batch: (batches + 1,) int64."""
         return self._patches.face_starts + self._patches.extra.shape[1]
+
+    @property
+    def table(self) -> EncodedMesh:
+        """What a file's table says of the mesh, without blocks."""
+        patches = self._patches
+        return EncodedMesh({}, [], patches.place_starts, patches.face_starts, patches.errors)
+
+    @property
+    def batch_errors(self) -> np.ndarray:
+        """Estimated deviation of the base and after each batch, in the mesh's units: (batches + 1,) float64."""
+        return self._patches.errors
 
     @property
     def attribute_names(self) -> dict[str, list[str]]:
@@ -162,6 +174,8 @@ class Progressive:
                     values = array[:vertices]
                 elif domain == "corner":
                     values = array[entry.T]
+                elif domain == "edge":
+                    values = array
                 elif domain == "face" or rows is None:
                     values = array[: entry.shape[1]]
                 else:
@@ -175,35 +189,42 @@ class Progressive:
         level = self._level(len(patches.places))
         if patches.vertex_order is None or patches.face_order is None or patches.face_turn is None:
             return level
-        faces, turn = np.argsort(patches.face_order), patches.face_turn
+        turn = patches.face_turn
         rows = (turn[:, None] + np.arange(3)) % 3
         if patches.turned.any():
             # the original's first corner is counted in the stored face, whose last two rows `level` has swapped
             shown = np.flatnonzero(side_rows(patches)[1] == 2)
             rows[shown] = (np.array([0, 2, 1])[turn[shown]][:, None] + np.arange(3)) % 3
-        corners = np.take_along_axis(level.faces, rows, 1)
+        number = patches.vertex_order.astype(np.int32)
+        edges = np.sort(number[level.edges], axis=1)
+        orders = {"vertex": np.argsort(patches.vertex_order), "edge": np.lexsort((edges[:, 1], edges[:, 0]))}
+        faces = np.argsort(patches.face_order)
         attributes: Attributes = {}
         for domain, named in level.attributes.items():
             for name, array in named.items():
                 if domain in ("corner", "side"):
                     array = array[np.arange(len(array))[:, None], rows]
-                ordered = np.argsort(patches.vertex_order) if domain == "vertex" else faces
-                attributes.setdefault(domain, {})[name] = array[ordered]
-        number = patches.vertex_order.astype(np.int32)
-        return Level(level.vertices[np.argsort(patches.vertex_order)], number[corners][faces],
-                     np.sort(number[level.edges], axis=1), attributes)
+                attributes.setdefault(domain, {})[name] = array[orders.get(domain, faces)]
+        return Level(level.vertices[orders["vertex"]], number[np.take_along_axis(level.faces, rows, 1)][faces],
+                     edges[orders["edge"]], attributes)
 
-    def to_bytes(self, *, bits: int | None = None, keep_order: bool = False) -> bytes:
-        """Return the stream; see `save`."""
-        if self._file is not None:
+    def encoded(self, *, bits: int | None = None, keep_order: bool = False) -> EncodedMesh:
+        """Return the mesh's blocks in a file; see `save`."""
+        if self._encoded is not None:
             if bits is not None or keep_order:
                 raise StreamError("a loaded stream is saved as it is: restore it and make a new one instead")
-            return self._file
+            if self.damage:
+                raise StreamError("a stream that is loaded in part cannot be saved: restore it and make a new one")
+            return self._encoded
         if bits is not None and not 4 <= bits <= 24:
             raise StreamError(f"bits is {bits}: give a whole number from 4 to 24 (10 to 20 are usual)")
         if bits is not None and not np.isfinite(self._patches.places).all():
             raise StreamError("a mesh with coordinates that are not finite cannot be quantised: leave bits out")
-        return encode(self._patches, bits=bits, keep_order=keep_order, meta=self.meta)
+        return encode_mesh(self._patches, bits=bits, keep_order=keep_order, meta=self.meta)
+
+    def to_bytes(self, *, bits: int | None = None, keep_order: bool = False) -> bytes:
+        """Return the stream; see `save`."""
+        return encode([self.encoded(bits=bits, keep_order=keep_order)], {}, [1.0])
 
     def save(self, path: str | os.PathLike[str], *, bits: int | None = None, keep_order: bool = False) -> int:
         """Write an .esopm file, in one step.
@@ -221,10 +242,14 @@ class Progressive:
         int
             Bytes written.
         """
-        data = self.to_bytes(bits=bits, keep_order=keep_order)
-        with atomic_output(path) as draft:
-            draft.write_bytes(data)
-        return len(data)
+        return write_bytes(path, self.to_bytes(bits=bits, keep_order=keep_order))
+
+
+def write_bytes(path: str | os.PathLike[str], data: bytes) -> int:
+    """Write a file in one step: it is there whole, or the old one is; return its size."""
+    with atomic_output(path) as draft:
+        draft.write_bytes(data)
+    return len(data)
 
 
 def _ancestors(parents: Ints, limit: int) -> Ints:
@@ -252,8 +277,8 @@ def progressive(vertices: ArrayLike, faces: ArrayLike, *,
     faces : array_like, (m, 3)
         Degenerate, repeated and non-manifold ones are welcome: they come back too.
     attributes : dict of dict of array_like
-        By domain and name: "vertex" (n, ...), "corner" (m, 3, ...), "face" (m, ...), and "side"
-        (m, 3, ...), of the side from each corner to the next.
+        By domain and name: "vertex" (n, ...), "corner" (m, 3, ...), "face" (m, ...), "side"
+        (m, 3, ...), of the side from each corner to the next, and "edge" (l, ...), of loose edges.
     edges : array_like, (l, 2)
         Loose edges.
     base_faces, ratio
@@ -313,13 +338,19 @@ def load_progressive(path: str | os.PathLike[str], *, partial: bool = False,
     StreamError
         It is no such file, or damaged, or of another version.
     """
+    return from_bytes(read_bytes(path, max_bytes), partial=partial or max_bytes is not None)
+
+
+def read_bytes(path: str | os.PathLike[str], limit: int | None = None) -> bytes:
+    """Read a file, or no more than so many bytes of it."""
     with Path(path).open("rb") as file:
-        data = file.read() if max_bytes is None else file.read(max(max_bytes, 0))
-    return from_bytes(data, partial=partial or max_bytes is not None)
+        return file.read() if limit is None else file.read(max(limit, 0))
 
 
 def from_bytes(data: bytes, *, partial: bool = False) -> Progressive:
-    """Read a stream from memory; see `load_progressive`."""
-    patches, header, damage = decode(data, partial=partial)
-    meta = header.get("meta")
-    return Progressive(patches, meta if isinstance(meta, dict) else {}, damage, data)
+    """Read a stream of one mesh from memory; see `load_progressive`."""
+    meshes, _, damage = decode(data, partial=partial)
+    if len(meshes) != 1:
+        raise StreamError(f"the stream holds {len(meshes)} meshes: read it with load_scene")
+    encoded, patches = meshes[0]
+    return Progressive(patches, encoded.header.get("meta", {}), damage, encoded)

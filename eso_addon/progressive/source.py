@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from ..core.mesh import Ints, MeshError, weld
 from .geometry import place_of
 
-DOMAINS = ("vertex", "corner", "face", "side")
+DOMAINS = ("vertex", "corner", "face", "side", "edge")
 Attributes = dict[str, dict[str, np.ndarray]]
 _KINDS = "?bBhHiIlLqQefd"
 
@@ -71,7 +71,8 @@ def make_source(vertices: ArrayLike, faces: ArrayLike, attributes: Mapping[str, 
     for name, indices in (("face", corners), ("edge", loose)):
         if indices.size and (indices.min() < 0 or indices.max() >= len(positions)):
             raise MeshError(f"a {name} names a vertex that is not there ({len(positions)} vertices): repair the mesh")
-    counts = {"vertex": (len(positions),), "corner": corners.shape, "face": (len(corners),), "side": corners.shape}
+    counts = {"vertex": (len(positions),), "corner": corners.shape, "face": (len(corners),), "side": corners.shape,
+              "edge": (len(loose),)}
     checked = _attributes(attributes or {}, counts)
     representative = weld(place_of(positions).astype(np.float64))
     own = np.flatnonzero(representative == np.arange(len(positions)))

@@ -1,505 +1,60 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Patches to the blocks of a stream, and back, batch by batch."""
+"""Meshes to the bytes of a stream, and back."""
 
 from __future__ import annotations
 
-import hashlib
-import struct
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from ..core.mesh import Ints
-from . import container, rans
-from .batch_codec import Connectivity, Done, Mesh, Splits, code_batch
-from .coder import Reader, Writer
-from .columns import ColumnReader, ColumnWriter, as_words, from_words
+from . import container
 from .container import Container
-from .errors import StreamError
-from .geometry import Grid, Shape, lossless_grid, quantised_grid
+from .mesh_codec import EncodedMesh, decode_mesh
 from .patches import Patches
 
-_BLOCK = struct.Struct("<II")  # bytes of symbols, of plain bits; columns fill the rest
-_DOMAINS = ("vertex", "corner", "face", "side")
+
+def file_order(meshes: list[EncodedMesh], scales: list[float]) -> tuple[Ints, Ints]:
+    """Return the mesh and the block of each row of a file's table: bases first, then batches by what they mend.
+
+    Parameters
+    ----------
+    meshes : list of EncodedMesh
+    scales : list of float
+        How large each mesh's unit is in the scene.
+    """
+    mesh = np.concatenate([np.full(len(each.places), index) for index, each in enumerate(meshes)])
+    block = np.concatenate([np.arange(len(each.places)) for each in meshes])
+    # a batch mends the error before it, which never grows along a mesh
+    before = np.concatenate([np.append(np.inf, np.minimum.accumulate(each.errors[:-1]) * scale)
+                             for each, scale in zip(meshes, scales, strict=True)])
+    order = np.lexsort((block, mesh, -before, block > 0))
+    return mesh[order], block[order]
 
 
-class _Codec:
-    """The state that writer and reader share, block after block."""
-
-    def __init__(self, header: dict[str, Any], table_places: Ints, table_faces: Ints, patches: Patches,
-                 numbers: Ints, grid: Grid, reading: bool) -> None:
-        self.header, self.patches, self.reading = header, patches, reading
-        self.table_places, self.table_faces = table_places, table_faces
-        count, width = int(table_places[-1]), int(table_faces[-1])
-        self.mesh = Mesh(grid, np.zeros((count, 3), np.int64), np.zeros((count, 3), np.int64),
-                         np.zeros((3, width), np.int64), np.full(count, -1), 0, 0)
-        self.numbers = numbers
-        self.connectivity, self.shape = Connectivity(), Shape()
-        self.wedged = "wedges" in header["needs"]
-        self.turned = "turned" in header["needs"]
-        self.vertex_seen = 0
-        self.words: dict[str, list[tuple[str, Ints, int]]] = {}
-        self.base_faces = self.state_wedge = np.zeros((3, width), np.int64)
-
-    # -- base ---------------------------------------------------------------------------------------------------
-
-    def base(self, block: ColumnWriter | ColumnReader) -> None:
-        """Code the base: places, faces, faces beside the splits, loose edges, attributes."""
-        mesh, patches, known = self.mesh, self.patches, not self.reading
-        count, width = int(self.table_places[0]), int(self.table_faces[0])
-        for axis in range(3):
-            column = self.numbers[:count, axis] & 0xFFFFFFFF if known else None
-            values = _running(block, 4, column, count)
-            mesh.numbers[:count, axis] = np.where(values >> 31, values - (1 << 32), values)
-        _check_numbers(mesh.grid, mesh.numbers[:count])
-        mesh.points[:count] = mesh.grid.predictors(mesh.numbers[:count])
-        faces = np.zeros((3, 0), np.int64)
-        if known:
-            faces = self.base_faces
-        mesh.faces[:, :width] = _code_faces(block, faces if known else None, width, count)
-        mesh.vertex_count, mesh.face_count = count, width
-        extra = self.header["extra"]
-        patches.extra = _code_faces(block, patches.extra if known else None, extra, count)
-        self._places_wedges(block, 0, count)
-        self._corner_wedges(block, np.concatenate((patches.extra, mesh.faces[:, :width]), axis=1), 0, 0, extra + width)
-        self._faces(block, np.full(extra + width, -1), 0)
-        edges = patches.edges.T if known else None
-        ends = int(patches.wedge_vertex[: int(patches.wedge_starts[count])].max(initial=-1)) + 1
-        patches.edges = _code_edges(block, edges, self.header["edges"], ends).T
-
-    # -- batches ------------------------------------------------------------------------------------------------
-
-    def batch(self, coder: Writer | Reader, block: ColumnWriter | ColumnReader, splits: Splits | None) -> Done:
-        """Code one batch."""
-        mesh = self.mesh
-        places, faces = mesh.vertex_count, mesh.face_count
-        done = code_batch(coder, self.connectivity, self.shape, mesh, splits)
-        if self.reading:
-            self.patches.opened[places : mesh.vertex_count] = done.there.sum(axis=0)
-        if self.columns or self.reading:
-            self._places_wedges(block, places, mesh.vertex_count)
-            self._moved_wedges(block, done, faces)
-            beside = np.repeat(done.start % max(faces, 1), done.there.sum(axis=0))
-            self._faces(block, self.header["extra"] + beside, self.header["extra"] + faces)
-        return done
-
-    @property
-    def columns(self) -> bool:
-        """Whether batches carry columns at all."""
-        return self.wedged or self.turned or bool(self.header["attributes"])
-
-    def _places_wedges(self, block: ColumnWriter | ColumnReader, first: int, last: int) -> None:
-        """Code the wedges of new places, and the attributes of their vertices and wedges."""
-        patches, count = self.patches, last - first
-        known = not self.reading
-        if self.wedged:
-            counts = np.diff(patches.wedge_starts[first : last + 1]) if known else None
-            counts = block.column(4, np.ones(count, np.int64), counts, count)
-            if self.reading:
-                if (counts < 1).any() or counts.sum() + patches.wedge_starts[first] > self.header["wedges"]:
-                    raise StreamError("the stream is damaged: more wedges than its header says; fetch the file again")
-                patches.wedge_starts[first + 1 : last + 1] = patches.wedge_starts[first] + np.cumsum(counts)
-        elif self.reading:
-            patches.wedge_starts[first + 1 : last + 1] = np.arange(first + 1, last + 1)
-        begin, end = int(patches.wedge_starts[first]), int(patches.wedge_starts[last])
-        place = np.repeat(np.arange(first, last), np.diff(patches.wedge_starts[first : last + 1]))
-        inner = patches.wedge_starts.take(place) != np.arange(begin, end)
-        self._wedge_parents(block, begin, end, place)
-        self._wedge_vertices(block, begin, end, inner)
-        vertices = np.flatnonzero(np.diff(patches.wedge_vertex[begin:end], prepend=self.vertex_seen - 1)) + begin
-        # a value is expected to be that of the wedge it merges into, and another wedge's that of the one before
-        source = np.where(patches.wedge_parents[begin:end] < 0, np.arange(begin, end) - 1,
-                          patches.wedge_parents[begin:end])
-        self._values(block, "corner", begin, end, source)
-        seen = self.vertex_seen
-        self.vertex_seen += len(vertices)
-        if self.reading and self.vertex_seen > self.header["vertices"]:
-            raise StreamError("the stream is damaged: more vertices than its header says; fetch the file again")
-        at = source.take(vertices - begin)
-        self._values(block, "vertex", seen, self.vertex_seen, np.where(at < 0, -1, patches.wedge_vertex.take(at)))
-
-    def _wedge_parents(self, block: ColumnWriter | ColumnReader, begin: int, end: int, place: Ints) -> None:
-        patches = self.patches
-        parent = self.mesh.parents.take(place)
-        new = parent >= 0
-        first = patches.wedge_starts.take(parent.clip(min=0))
-        if self.reading:
-            patches.wedge_parents[begin:end] = np.where(new, first, -1)
-        if not self.wedged:
-            return
-        several = np.flatnonzero(new & (patches.wedge_starts.take(parent + 1) - first > 1))
-        known = None if self.reading else patches.wedge_parents[begin:end][several] - first[several]
-        local = block.column(4, np.zeros(len(several), np.int64), known, len(several))
-        if self.reading:
-            limit = patches.wedge_starts.take(parent[several] + 1) - first[several]
-            if (local >= limit).any():
-                raise StreamError("the stream is damaged: a wedge joins none that is there; fetch the file again")
-            patches.wedge_parents[begin:end][several] += local
-
-    def _wedge_vertices(self, block: ColumnWriter | ColumnReader, begin: int, end: int, inner: np.ndarray) -> None:
-        patches = self.patches
-        at = np.flatnonzero(inner)
-        fresh = np.ones(end - begin, np.int64)
-        if self.wedged:
-            known = None
-            if not self.reading:
-                known = np.diff(patches.wedge_vertex[begin:end], prepend=self.vertex_seen - 1).take(at)
-            fresh[at] = block.column(1, np.ones(len(at), np.int64), known, len(at)) & 1
-        if self.reading:
-            patches.wedge_vertex[begin:end] = self.vertex_seen - 1 + np.cumsum(fresh)
-
-    def _moved_wedges(self, block: ColumnWriter | ColumnReader, done: Done, faces_before: int) -> None:
-        """Code the wedges of corners that changed vertex and of new faces."""
-        mesh, patches = self.mesh, self.patches
-        rows, faces = done.slot // max(faces_before, 1), done.slot % max(faces_before, 1)
-        new = np.arange(faces_before, mesh.face_count)
-        rows = np.concatenate((rows, np.tile(np.arange(3), len(new))))
-        faces = np.concatenate((faces, np.repeat(new, 3)))
-        self._code_wedges(block, mesh.faces, self.state_wedge, rows, faces, patches.wedge_starts)
-
-    def _corner_wedges(self, block: ColumnWriter | ColumnReader, corners: Ints, first: int, last: int,
-                       count: int) -> None:
-        """Code the wedges of the base's corners, faces beside the splits first."""
-        extra = self.header["extra"]
-        whole = np.zeros((3, count), np.int64)
-        if not self.reading:
-            whole = np.concatenate((self.patches.extra_wedge, self.state_wedge[:, : count - extra]), axis=1)
-        if self.wedged:
-            rows, faces = np.tile(np.arange(3), count), np.repeat(np.arange(count), 3)
-            self._code_wedges(block, corners, whole, rows, faces, self.patches.wedge_starts)
-        self.patches.extra_wedge = whole[:, :extra]
-        self.state_wedge[:, : count - extra] = whole[:, extra:]
-
-    def _code_wedges(self, block: ColumnWriter | ColumnReader, corners: Ints, wedges: Ints, rows: Ints, faces: Ints,
-                     starts: Ints) -> None:
-        if not self.wedged:
-            return
-        place = corners[rows, faces]
-        size = starts.take(place + 1) - starts.take(place)
-        several = np.flatnonzero(size > 1)
-        if self.reading:
-            wedges[rows, faces] = 0
-        rows, faces = rows.take(several), faces.take(several)
-        known = None if self.reading else self.final_wedge(corners, wedges, rows, faces)
-        width = 1 if int(size.max(initial=1)) <= 256 else 4
-        found = block.column(width, np.zeros(len(several), np.int64), known, len(several))
-        if self.reading and (found >= size.take(several)).any():
-            raise StreamError("the stream is damaged: a corner has no such wedge; fetch the file again")
-        wedges[rows, faces] = found
-
-    def final_wedge(self, corners: Ints, wedges: Ints, rows: Ints, faces: Ints) -> Ints:
-        """Return the known wedges of some corners (writing only)."""
-        if corners is not self.mesh.faces:
-            return wedges[rows, faces]
-        patches, starts = self.patches, self.patches.wedge_starts
-        entry = starts.take(patches.faces[rows, faces]) + patches.corner_wedge[rows, faces]
-        limit = starts[self.mesh.vertex_count]
-        while True:  # the wedge that it has become by now
-            late = np.flatnonzero(entry >= limit)
-            if len(late) == 0:
-                break
-            entry[late] = patches.wedge_parents.take(entry.take(late))
-        return entry - starts.take(corners[rows, faces])
-
-    def _faces(self, block: ColumnWriter | ColumnReader, beside: Ints, first: int) -> None:
-        """Code the attributes of new faces; expected is the value of the face that an arc starts in."""
-        last = first + len(beside)
-        beside = np.where(beside < 0, np.arange(first, last) - 1, beside)
-        self._values(block, "face", first, last, beside)
-        self._values(block, "side", first, last, beside)
-        if self.turned:
-            extra = self.header["extra"]
-            own = slice(max(first - extra, 0), max(last - extra, 0))
-            size = own.stop - own.start
-            known = None if self.reading else self.patches.turned[own].astype(np.int64)
-            values = block.column(1, np.zeros(size, np.int64), known, size)
-            self.patches.turned[own] = values & 1
-
-    def _values(self, block: ColumnWriter | ColumnReader, domain: str, first: int, last: int, source: Ints) -> None:
-        for _, words, width in self.words.get(domain, ()):
-            for column in words.T:
-                if first == 0:
-                    known = None if self.reading else column[:last]
-                    column[:last] = _running(block, width, known, last)
-                    continue
-                # what is in the block itself is not known yet
-                expected = column.take(np.where((source >= 0) & (source < first), source, 0))
-                known = None if self.reading else column[first:last]
-                column[first:last] = block.column(width, expected, known, last - first)
-
-
-def _running(block: ColumnWriter | ColumnReader, width: int, known: Ints | None, count: int) -> Ints:
-    """Code a column by differences from the row before."""
-    bits = 8 * width
-    mask = (1 << bits) - 1
-    if known is not None:
-        before = np.concatenate(([0], known[:-1])) if count else known
-        block.column(width, before, known, count)
-        return known
-    steps = block.column(width, np.zeros(count, np.int64), None, count)
-    return np.cumsum(steps) & mask
-
-
-def _code_faces(block: ColumnWriter | ColumnReader, known: Ints | None, count: int, places: int) -> Ints:
-    """Code faces: the first corner against the face before, the others against the first."""
-    first = _running(block, 4, None if known is None else known[0], count)
-    rows = [first] + [block.column(4, first, None if known is None else known[row], count) for row in (1, 2)]
-    faces = np.stack(rows)
-    if faces.size and int(faces.max()) >= places:
-        raise StreamError("the stream is damaged: a face names a vertex that is not there; fetch the file again")
-    return faces
-
-
-def _code_edges(block: ColumnWriter | ColumnReader, known: Ints | None, count: int, vertices: int) -> Ints:
-    first = _running(block, 4, None if known is None else known[0], count)
-    edges = np.stack((first, block.column(4, first, None if known is None else known[1], count)))
-    if edges.size and int(edges.max()) >= vertices:
-        raise StreamError("the stream is damaged: an edge names a vertex that is not there; fetch the file again")
-    return edges
-
-
-def _check_numbers(grid: Grid, numbers: Ints) -> None:
-    if grid.kind != 2 and len(numbers) and int(np.abs(numbers).max()) >= 1 << 27:
-        raise StreamError("the stream is damaged: a coordinate is off its grid; fetch the file again")
-
-
-def encode(patches: Patches, *, bits: int | None, keep_order: bool, meta: dict[str, Any]) -> bytes:
-    """Return the bytes of a stream."""
-    if bits is None:
-        grid, numbers = lossless_grid(patches.places)
-    else:
-        grid, numbers = quantised_grid(patches.places, bits)
-        patches = replace(patches, places=grid.floats(numbers))
-    patches = replace(patches)
-    several = len(patches.wedge_vertex) > len(patches.places)
-    attributes = [[domain, name, array.dtype.str, list(array.shape[2:] if domain == "side" else array.shape[1:])]
-                  for domain in _DOMAINS for name, array in patches.attributes.get(domain, {}).items()]
-    needs = [name for name, there in (("wedges", several), ("attributes", bool(attributes)),
-                                      ("extra-faces", patches.extra.size > 0), ("edges", len(patches.edges) > 0),
-                                      ("turned", bool(patches.turned.any())), ("quantised", bits is not None)) if there]
-    header: dict[str, Any] = {
-        "places": len(patches.places), "faces": patches.faces.shape[1], "extra": patches.extra.shape[1],
-        "edges": len(patches.edges), "vertices": patches.vertices, "wedges": len(patches.wedge_vertex),
-        "grid": [grid.kind, grid.scale, *grid.origin, grid.shift], "needs": needs,
-        "attributes": attributes, "hash": digest(patches), "meta": meta,
-        "lanes": rans.lanes_for(len(patches.places))}
-    if bits is not None:
-        header["bits"] = bits
-    codec = _Codec(header, patches.place_starts, patches.face_starts, patches, numbers, grid, False)
-    codec.words = {domain: [(name, *as_words(array)) for name, array in patches.attributes.get(domain, {}).items()]
-                   for domain in _DOMAINS}
-    codec.base_faces = _faces_at_base(patches)
-    codec.state_wedge = _wedges_at_base(patches, several)
-    block = ColumnWriter()
-    codec.base(block)
-    base = block.finish()
-    parts, runs = [], []
-    for splits in patches.batches:
-        first = codec.mesh.vertex_count
-        writer, block = Writer(), ColumnWriter()
-        codec.batch(writer, block, replace(splits, numbers=numbers[first : first + len(splits.vertex)]))
-        runs.append(writer.runs)
-        parts.append((writer.plain(), block.finish()))
-    states, words = rans.encode(runs, header["lanes"])
-    blocks = [base + states] + [_BLOCK.pack(len(symbols), len(plain)) + symbols + plain + columns
-                                for symbols, (plain, columns) in zip(words, parts, strict=True)]
-    table = container.make_table(blocks, patches.place_starts, patches.face_starts, patches.errors)
-    optional = {"order": _order_block(patches)} if keep_order else {}
+def encode(meshes: list[EncodedMesh], meta: dict[str, Any], scales: list[float]) -> bytes:
+    """Return the bytes of a file; `scales` as in `file_order`."""
+    mesh, block = file_order(meshes, scales)
+    rows = list(zip(mesh.tolist(), block.tolist(), strict=True))
+    blocks = [meshes[index].blocks[number] for index, number in rows]
+    places, faces, errors = (np.array([getattr(meshes[index], name)[number] for index, number in rows])
+                             for name in ("places", "faces", "errors"))
+    table = container.make_table(blocks, places, faces, errors, mesh)
+    optional = {(name, index): data for index, each in enumerate(meshes) for name, data in each.optional.items()}
+    header = {"meshes": [each.header for each in meshes], "meta": meta}
     return container.write(Container(header, table, blocks, optional))
 
 
-def _faces_at_base(patches: Patches) -> Ints:
-    faces = patches.faces[:, : patches.face_starts[0]].copy()
-    limit = patches.place_starts[0]
-    while True:
-        late = faces >= limit
-        if not late.any():
-            return faces
-        faces[late] = patches.parents[faces[late]]
-
-
-def _wedges_at_base(patches: Patches, several: bool) -> Ints:
-    wedges = np.zeros_like(patches.faces)
-    width = patches.face_starts[0]
-    if not several:
-        return wedges
-    starts, limit = patches.wedge_starts, patches.wedge_starts[patches.place_starts[0]]
-    entry = starts.take(patches.faces[:, :width]) + patches.corner_wedge[:, :width]
-    place = patches.faces[:, :width].copy()
-    while True:
-        late = entry >= limit
-        if not late.any():
-            break
-        entry[late] = patches.wedge_parents[entry[late]]
-        place[late] = patches.parents[place[late]]
-    wedges[:, :width] = entry - starts.take(place)
-    return wedges
-
-
-def _order_block(patches: Patches) -> bytes:
-    assert patches.vertex_order is not None
-    assert patches.face_order is not None
-    assert patches.face_turn is not None
-    block = ColumnWriter()
-    _running(block, 4, patches.vertex_order, len(patches.vertex_order))
-    _running(block, 4, patches.face_order, len(patches.face_order))
-    block.column(1, np.zeros(len(patches.face_turn), np.int64), patches.face_turn, len(patches.face_turn))
-    return block.finish()
-
-
-def decode(data: bytes, *, partial: bool = False) -> tuple[Patches, dict[str, Any], str]:
-    """Return the patches of a stream, its header, and what was wrong with it (only with `partial`)."""
+def decode(data: bytes, *, partial: bool = False) -> tuple[list[tuple[EncodedMesh, Patches]], dict[str, Any], str]:
+    """Return the meshes of a file, its header's `meta`, and what was wrong with it (only with `partial`)."""
     parts = container.read(data, partial=partial)
-    header, table = parts.header, parts.table
-    given = len(parts.blocks)
-    places, faces = table["places"].astype(np.int64), table["faces"].astype(np.int64)
-    if places[-1] != header["places"] or faces[-1] != header["faces"]:
-        raise StreamError("the stream's table and header differ: fetch the file again")
-    limit = 4096 * (len(data) + 4096)
-    if header["wedges"] > limit or header["extra"] > limit or header["edges"] > limit or int(faces[-1]) > 2 * limit:
-        raise StreamError("the stream's counts are larger than it can hold: fetch the file again")
-    places, faces = places[:given], faces[:given]
-    grid = _grid(header["grid"])
-    count, width, extra = int(places[-1]), int(faces[-1]), header["extra"]
-    wedges = header["wedges"] if "wedges" in header["needs"] else header["places"]
-    none = np.zeros(0, np.int64)
-    patches = Patches(np.zeros((0, 3), np.float32), none, np.zeros((3, 0), np.int64), [], places, faces,
-                      np.zeros((3, 0), np.int64), np.zeros(count + 1, np.int64), np.full(wedges, -1),
-                      np.zeros(wedges, np.int64),
-                      np.zeros((3, 0), np.int64), np.zeros((3, 0), np.int64), np.zeros(width, np.uint8),
-                      np.zeros((0, 2), np.int64), {}, None, None, None, table["error"][:given].astype(np.float64),
-                      np.zeros(count, np.uint8))
-    codec = _Codec(header, places, faces, patches, none, grid, True)
-    descriptors = _descriptors(header)
-    sizes = {"vertex": header["vertices"], "corner": wedges, "face": extra + width, "side": extra + width}
-    for domain, name, dtype, shape in descriptors:
-        items = int(np.prod(shape, dtype=np.int64)) * (3 if domain == "side" else 1) * max(dtype.itemsize // 4, 1)
-        if items * sizes[domain] > limit:
-            raise StreamError("the stream's counts are larger than it can hold: fetch the file again")
-        words = np.zeros((sizes[domain], items), np.int64)
-        codec.words.setdefault(domain, []).append((name, words, min(dtype.itemsize, 4)))
-    states = 4 * header["lanes"]
-    if not 0 < states <= len(parts.blocks[0]):
-        raise StreamError("the header of the stream says nothing sensible: fetch the file again")
-    codec.base(ColumnReader(parts.blocks[0][:-states]))
-    symbols = rans.RansReader(parts.blocks[0][-states:])
-    for number in range(1, given):
-        _read_batch(codec, symbols, parts.blocks[number])
-        if codec.mesh.vertex_count != places[number] or codec.mesh.face_count != faces[number]:
-            raise StreamError("the stream is damaged: a batch holds other counts than its table; fetch the file again")
-    _finish(patches, codec, descriptors, given)
-    if given == len(table):
-        if "order" in parts.optional:
-            _read_order(patches, parts.optional["order"])
-        if digest(patches) != header["hash"]:
-            raise StreamError("the restored mesh is not the one that was written: fetch the file again")
-    return patches, header, parts.damage
-
-
-def _read_batch(codec: _Codec, reader: rans.RansReader, data: bytes) -> None:
-    if len(data) < _BLOCK.size:
-        raise StreamError("the stream is damaged: a batch is too short; fetch the file again")
-    symbols, plain = _BLOCK.unpack_from(data)
-    begin = _BLOCK.size
-    if begin + symbols + plain > len(data) or plain % 4 or symbols % 2:
-        raise StreamError("the stream is damaged: a batch's parts do not fit; fetch the file again")
-    reader.feed(data[begin : begin + symbols])
-    coder = Reader(reader, data[begin + symbols : begin + symbols + plain])
-    codec.batch(coder, ColumnReader(data[begin + symbols + plain :]), None)
-
-
-def _finish(patches: Patches, codec: _Codec, descriptors: list[tuple], given: int) -> None:
-    mesh = codec.mesh
-    patches.places = mesh.grid.floats(mesh.numbers[: mesh.vertex_count])
-    patches.parents = mesh.parents[: mesh.vertex_count]
-    patches.faces = mesh.faces[:, : mesh.face_count]
-    patches.corner_wedge = codec.state_wedge[:, : mesh.face_count]
-    wedges = int(patches.wedge_starts[-1])
-    patches.wedge_parents, patches.wedge_vertex = patches.wedge_parents[:wedges], patches.wedge_vertex[:wedges]
-    sizes = {"vertex": codec.vertex_seen, "corner": wedges}
-    faces = patches.extra.shape[1] + mesh.face_count
-    place = dict.fromkeys(_DOMAINS, 0)
-    for domain, name, dtype, shape in descriptors:
-        _, words, _ = codec.words[domain][place[domain]]
-        place[domain] += 1
-        rows = words[: sizes.get(domain, faces)]
-        whole = (3, *shape) if domain == "side" else shape
-        patches.attributes.setdefault(domain, {})[name] = from_words(rows, dtype, whole)
-
-
-def _read_order(patches: Patches, data: bytes) -> None:
-    block = ColumnReader(data)
-    vertices, faces = patches.vertices, patches.extra.shape[1] + patches.faces.shape[1]
-    order = _running(block, 4, None, vertices), _running(block, 4, None, faces)
-    for numbers in order:
-        if not np.array_equal(np.sort(numbers), np.arange(len(numbers))):
-            raise StreamError("the stream is damaged: its order leaves something out; fetch the file again")
-    patches.vertex_order, patches.face_order = order
-    patches.face_turn = block.column(1, np.zeros(faces, np.int64), None, faces) % 3
-
-
-def _grid(values: list) -> Grid:
-    try:
-        kind, scale, x, y, z, shift = values
-        grid = Grid(int(kind), float(scale), (float(x), float(y), float(z)), int(shift))
-    except (ValueError, TypeError, OverflowError):
-        raise StreamError("the header of the stream says nothing sensible: fetch the file again") from None
-    if not (0 <= grid.kind <= 2 and np.isfinite([grid.scale, *grid.origin]).all() and grid.scale > 0
-            and 0 <= grid.shift < 40):
-        raise StreamError("the header of the stream says nothing sensible: fetch the file again")
-    return grid
-
-
-def _descriptors(header: dict[str, Any]) -> list[tuple]:
-    result = []
-    try:
-        for domain, name, dtype, shape in header["attributes"]:
-            kind = np.dtype(dtype)
-            if domain not in _DOMAINS or kind.kind not in "biuf" or not isinstance(name, str) or len(shape) > 1:
-                raise ValueError
-            result.append((domain, name, kind, tuple(int(size) for size in shape)))
-    except (ValueError, TypeError):
-        raise StreamError("the header of the stream says nothing sensible: fetch the file again") from None
-    return result
-
-
-def digest(patches: Patches) -> str:
-    """Return the hash of the finest mesh in the stream's order, each face from its lowest vertex: SHA-256, hex."""
-    positions, corners, wedges = finest(patches)
-    first = corners.argmin(axis=0) if corners.size else np.zeros(0, np.int64)
-    rows = (first + np.arange(3)[:, None]) % 3
-    sha = hashlib.sha256()
-    sha.update(np.ascontiguousarray(positions, "<f4").tobytes())
-    turn = np.take_along_axis
-    sha.update(turn(corners, rows, 0).T.astype("<u4").tobytes())
-    sha.update(patches.edges.astype("<u4").tobytes())
-    for domain in _DOMAINS:
-        for array in patches.attributes.get(domain, {}).values():
-            if domain == "corner":
-                array = array[turn(wedges, rows, 0).T]
-            elif domain == "side":
-                array = array[np.arange(len(array))[:, None], turn(side_rows(patches), rows, 0).T]
-            sha.update(np.ascontiguousarray(array).tobytes())
-    return sha.hexdigest()
-
-
-def side_rows(patches: Patches) -> Ints:
-    """Return the row of each output side in the stored face: turned faces run the other way."""
-    extra = patches.extra.shape[1]
-    rows = np.repeat(np.arange(3)[:, None], extra + patches.faces.shape[1], axis=1)
-    turned = np.flatnonzero(patches.turned) + extra
-    rows[1:, turned] = rows[:0:-1, turned]
-    return rows
-
-
-def finest(patches: Patches) -> tuple[np.ndarray, Ints, Ints]:
-    """Return positions by vertex, (3, m) corners as vertices, and as wedges, in their original winding."""
-    place = np.concatenate((patches.extra, patches.faces), axis=1)
-    wedges = patches.wedge_starts.take(place) + np.concatenate((patches.extra_wedge, patches.corner_wedge), axis=1)
-    if patches.turned.any():
-        wedges = np.take_along_axis(wedges, side_rows(patches), 0)
-    corners = patches.wedge_vertex.take(wedges)
-    place_of_wedge = np.repeat(np.arange(len(patches.places)), np.diff(patches.wedge_starts))
-    fresh = np.flatnonzero(np.diff(patches.wedge_vertex, prepend=-1))
-    return patches.places.take(place_of_wedge.take(fresh), axis=0), corners, wedges
+    table = parts.table
+    meshes = []
+    for index, header in enumerate(parts.header["meshes"]):
+        own = np.flatnonzero(table["mesh"] == index)
+        blocks = [parts.blocks[row] for row in own if row < len(parts.blocks)]
+        optional = {name: block for (name, mesh), block in parts.optional.items() if mesh == index}
+        mesh = EncodedMesh(header, blocks, table["places"][own].astype(np.int64), table["faces"][own].astype(np.int64),
+                           table["error"][own].astype(np.float64), optional)
+        meshes.append((mesh, decode_mesh(mesh, len(data))))
+    return meshes, parts.header.get("meta", {}), parts.damage

@@ -81,9 +81,9 @@ def test_other_versions_and_files_are_refused() -> None:
 
 def test_unknown_needs_are_refused_and_unknown_options_skipped() -> None:
     parts = container.read(STREAMS[0], partial=False)
-    parts.optional["sparkle"] = b"123"
+    parts.optional["sparkle", 0] = b"123"
     assert from_bytes(container.write(parts)).face_count
-    parts.header["needs"] = ["holograms"]
+    parts.header["meshes"][0]["needs"] = ["holograms"]
     with pytest.raises(StreamError, match="holograms"):
         from_bytes(container.write(parts))
 
@@ -93,22 +93,25 @@ def tampered(data: bytes, rng: np.random.Generator) -> bytes:
     parts = container.read(data, partial=False)
     blocks, table = [bytearray(b) for b in parts.blocks], parts.table.copy()
     header = json.loads(json.dumps(parts.header))
+    first = header["meshes"][0]
     for kind in rng.integers(0, 10, rng.integers(1, 4)):
         block = blocks[rng.integers(0, len(blocks))]
-        name = str(rng.choice(list(header)))
+        entry = first if rng.random() < 0.8 else header
+        name = str(rng.choice(list(entry)))
         if kind < 7 and len(block):
             block[rng.integers(0, len(block))] = rng.integers(0, 256)
             if kind == 0:
                 del block[rng.integers(0, len(block) + 1) :]
         elif kind == 7:
             name = COUNTS[rng.integers(0, len(COUNTS))]
-            header[name] = int(rng.choice([0, 1, parts.header[name] + 1, 2**20, 2**31 - 1]))
+            known = parts.header["meshes"][0][name]
+            first[name] = int(rng.choice([0, 1, known + 1, 2**20, 2**31 - 1]))
         elif kind == 8:
             row = rng.integers(0, len(table))
             table["places"][row:] = int(rng.choice([0, 1000, 10**6, 2**31]))
-            header["places"] = int(table["places"][-1]) % 2**31
+            first["places"] = int(table["places"][-1]) % 2**31
         else:
-            header[name] = [None, [], "x", -1, 1.5, {}, [[1, 2, 3]], True, [0, 1e308, 0, 0, 0, 3]][rng.integers(0, 9)]
+            entry[name] = [None, [], "x", -1, 1.5, {}, [[1, 2, 3]], True, [0, 1e308, 0, 0, 0, 3]][rng.integers(0, 9)]
     table["length"] = [len(block) for block in blocks]
     table["checksum"] = [zlib.crc32(bytes(block)) for block in blocks]
     return container.write(container.Container(header, table, [bytes(b) for b in blocks], parts.optional))
@@ -125,7 +128,7 @@ def test_tampered_contents_with_right_checksums() -> None:
 def test_what_once_failed() -> None:
     parts = container.read(STREAMS[0], partial=False)
     for name, value in (("extra", True), ("places", True), ("grid", [0, 1e308, 0, 0, 0, 3]), ("lanes", 0)):
-        header = {**parts.header, name: value}
+        header = {**parts.header, "meshes": [{**parts.header["meshes"][0], name: value}]}
         assert use(container.write(container.Container(header, parts.table, parts.blocks)), partial=False) is None
     # a signalling NaN is a position like any other
     points, faces = grid(4, 4, np.random.default_rng(0))
