@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Simplified meshes as objects of the scene: beside their source, in its place, or as levels in a collection."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 
 import bpy
 
 from ..core.mesh import MeshError
+from .modifiers import keep_modifiers
 
 # Custom properties of a result, for scripts and exporters.
 SOURCE, TRIANGLES, RATIO, ERROR = "eso_source", "eso_triangles", "eso_ratio", "eso_error"
@@ -34,6 +35,7 @@ def add_object(
     *,
     modifiers_applied: bool,
     properties: Mapping[str, object],
+    live: Collection[str] = (),
 ) -> bpy.types.Object:
     """Add an object that stands where its source stands.
 
@@ -49,6 +51,8 @@ def add_object(
         The mesh has the modifiers in it already, so that the object goes without.
     properties : mapping
         Custom properties of the new object.
+    live : collection of str
+        Names of modifiers that are not in the mesh, and stay.
 
     Returns
     -------
@@ -60,7 +64,7 @@ def add_object(
     obj.name = name
     obj.data = mesh
     if modifiers_applied:
-        obj.modifiers.clear()
+        keep_modifiers(obj, live)
     obj.hide_viewport = obj.hide_select = False
     for key, value in properties.items():
         obj[key] = value
@@ -110,7 +114,12 @@ def why_not_in_place(obj: bpy.types.Object) -> str:
 
 
 def replace_mesh(
-    obj: bpy.types.Object, mesh: bpy.types.Mesh, *, modifiers_applied: bool, all_users: bool = False
+    obj: bpy.types.Object,
+    mesh: bpy.types.Mesh,
+    *,
+    modifiers_applied: bool,
+    all_users: bool = False,
+    live: Collection[str] = (),
 ) -> None:
     """Put a new mesh in the place of an object's own.
 
@@ -123,6 +132,8 @@ def replace_mesh(
         The mesh has the modifiers in it already, so that they are removed.
     all_users : bool
         The other objects that share the old mesh get the new one too.
+    live : collection of str
+        Names of modifiers that are not in the mesh, and stay.
 
     Raises
     ------
@@ -137,16 +148,17 @@ def replace_mesh(
         old.user_remap(mesh)
     obj.data = mesh
     if modifiers_applied:
-        obj.modifiers.clear()
+        keep_modifiers(obj, live)
     if old.users == 0:
         name = old.name
         bpy.data.meshes.remove(old)
         mesh.name = name
 
 
-def result_properties(source: bpy.types.Object, before: int, after: int, error: float) -> dict[str, object]:
-    """Give the custom properties of a result: its source's name, triangles, their share, and the error."""
-    return {SOURCE: source.name, TRIANGLES: after, RATIO: after / max(before, 1), ERROR: error}
+def result_properties(source: bpy.types.Object, before: int, after: int, error: float | None) -> dict[str, object]:
+    """Give the custom properties of a result: its source's name, triangles, their share, and the error if known."""
+    known = {} if error is None else {ERROR: error}
+    return {SOURCE: source.name, TRIANGLES: after, RATIO: after / max(before, 1), **known}
 
 
 def leave_edit_mode(obj: bpy.types.Object) -> None:

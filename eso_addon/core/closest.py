@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from typing import Any
 
 import numpy as np
@@ -86,6 +86,21 @@ class ClosestPoints:
         closest, face, squared
             (p, 3) float64, (p,) int64 and (p,) float64; NaN, -1 and infinity where nothing lies within `max_distance`.
         """
+        steps = self.query_steps(points, max_distance=max_distance, hint=hint)
+        while True:
+            try:
+                next(steps)
+            except StopIteration as end:
+                return end.value
+
+    def query_steps(
+        self,
+        points: Floats,
+        *,
+        max_distance: float | None = None,
+        hint: Ints | None = None,
+    ) -> Generator[None, None, tuple[Floats, Ints, Floats]]:
+        """Do what `query` does in steps: yields after each block of points, returns the answers, may be closed."""
         points = (np.asarray(points, dtype=np.float64) - self._center) / self._size
         squared = np.full(len(points), np.inf if max_distance is None else (max_distance / self._size) ** 2)
         slot = np.full(len(points), -1, dtype=np.int64)
@@ -95,6 +110,7 @@ class ClosestPoints:
             walk.start(None if guess is None else guess.take(rows))
             walk.run()
             squared[rows], slot[rows] = walk.squared, walk.slot
+            yield
         return self._finish(points, slot)
 
     def _slots(self, faces: Ints) -> Ints:

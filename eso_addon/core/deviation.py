@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Generator
 from dataclasses import asdict, dataclass
 
 import numpy as np
@@ -90,6 +91,24 @@ def measure(
     MeshError
         A mesh is malformed, not finite, or has no face with an area.
     """
+    steps = measure_steps(v0, f0, v1, f1, samples=samples, seed=seed)
+    while True:
+        try:
+            next(steps)
+        except StopIteration as end:
+            return end.value
+
+
+def measure_steps(
+    v0: ArrayLike,
+    f0: ArrayLike,
+    v1: ArrayLike,
+    f1: ArrayLike,
+    *,
+    samples: int | None = None,
+    seed: int = 0,
+) -> Generator[float, None, Deviation]:
+    """Do what `measure` does in steps: yields progress from 0 to 1, returns the deviation, may be closed."""
     if samples is not None and samples < 1:
         raise MeshError(f"samples must be at least 1, not {samples}")
     count = _SAMPLES if samples is None else int(samples)
@@ -97,8 +116,9 @@ def measure(
     corners = original.vertices.take(original.faces.ravel(), axis=0)
     diagonal = float(np.linalg.norm(corners.max(axis=0) - corners.min(axis=0)))
     rng = np.random.default_rng(seed)
-    forward = _one_way(original, simplified, count, rng, _TIE * diagonal)
-    backward = _one_way(simplified, original, count, rng, _TIE * diagonal)
+    yield 0.02
+    forward = yield from _one_way(original, simplified, count, rng, _TIE * diagonal, 0.02)
+    backward = yield from _one_way(simplified, original, count, rng, _TIE * diagonal, 0.51)
     symmetric = OneWay(
         maximum=max(forward.maximum, backward.maximum),
         mean=max(forward.mean, backward.mean),
@@ -129,14 +149,27 @@ class _Surface:
         return cls(points, corners[good], vectors[good] / areas[good, None])
 
 
-def _one_way(source: _Surface, target: _Surface, count: int, rng: np.random.Generator, tie: float) -> OneWay:
-    """Measure from samples of the source to the target."""
+def _one_way(
+    source: _Surface, target: _Surface, count: int, rng: np.random.Generator, tie: float, begun: float
+) -> Generator[float, None, OneWay]:
+    """Measure from samples of the source to the target; yields progress from what was begun with, to 0.49 more."""
     corners = source.vertices.take(np.unique(source.faces), axis=0)
     points, face, _ = face_samples(source.vertices, source.faces, count, rng)
     edges = edge_samples(source.vertices, source.faces, max(count // 2, 1), rng)
+    yield begun
     search = ClosestPoints(target.vertices, target.faces)
-    farthest = max(search.query(others)[2].max() for others in (corners, edges))
-    closest, hit, squared = search.query(points)
+    answers = []
+    for number, queried in enumerate((corners, edges, points)):
+        steps = search.query_steps(queried)
+        while True:
+            try:
+                next(steps)
+            except StopIteration as end:
+                answers.append(end.value)
+                break
+            yield begun + 0.49 * (number + 0.5) / 3
+    closest, hit, squared = answers[2]
+    farthest = max(answer[2].max() for answer in answers[:2])
     cosine = _best_cosine(source.normals.take(face, axis=0), closest, hit, target, tie)
     return OneWay(
         maximum=float(np.sqrt(max(squared.max(), farthest))),

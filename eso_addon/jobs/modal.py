@@ -9,7 +9,9 @@ import bpy
 from ..core.mesh import MeshError
 from .worker import GRACE_SECONDS, Steps, Worker, run_to_end
 
-_POLL_SECONDS = 0.05
+_POLL_SECONDS = 0.01
+# Each picture of the bar costs a redraw, which window and engine wait for.
+_SHOW_SECONDS = 0.5
 # What the user may go on doing while the engine works; anything else could change the source under it.
 _VIEW_EVENTS = {"MIDDLEMOUSE", "WHEELUPMOUSE", "WHEELDOWNMOUSE", "MOUSEMOVE", "TRACKPADPAN", "TRACKPADZOOM"}
 
@@ -22,7 +24,7 @@ class EngineOperator:
     _timer: Any
     _start: float
     _stop_time: float
-    _shown: str = ""
+    _show_time: float = 0.0
 
     def prepare(self, context: bpy.types.Context) -> Steps[Any]:
         """Read Blender's data and return the engine's generator, which touches arrays only."""
@@ -51,9 +53,7 @@ class EngineOperator:
             return self._refused(error)
         manager = context.window_manager
         self._timer = manager.event_timer_add(_POLL_SECONDS, window=context.window)
-        manager.progress_begin(0, 100)
         manager.modal_handler_add(self)
-        self._shown = ""
         self._show_progress(context)
         return {"RUNNING_MODAL"}
 
@@ -63,7 +63,7 @@ class EngineOperator:
             self._worker.stop()
             self._stop_time = time.perf_counter()
         if self._worker.is_running and not self._is_given_up():
-            if event.type == "TIMER":
+            if event.type == "TIMER" and time.perf_counter() - self._show_time >= _SHOW_SECONDS:
                 self._show_progress(context)
             return {"PASS_THROUGH"} if event.type in _VIEW_EVENTS else {"RUNNING_MODAL"}
         self._clean_up(context)
@@ -97,17 +97,35 @@ class EngineOperator:
         return {"CANCELLED"}
 
     def _show_progress(self, context: bpy.types.Context) -> None:
-        percent = min(max(round(self._worker.progress * 100), 0), 100)
-        state = "stopping" if self._worker.is_stopped else f"{percent} %" if percent else "working"
-        text = f"{self.bl_label}: {state}   |   Esc: cancel"  # type: ignore[attr-defined]
-        if text != self._shown:  # each change costs a redraw, which the engine waits for
-            self._shown = text
-            context.window_manager.progress_update(percent)
-            context.workspace.status_text_set(text)
+        self._show_time = time.perf_counter()
+        run = context.window_manager.eso_last_run
+        run.running = self.bl_label  # type: ignore[attr-defined]
+        run.stopping = self._worker.is_stopped
+        run.progress = min(max(self._worker.progress, 0.0), 1.0)
+        context.workspace.status_text_set(_draw_status)
+        _redraw_sidebars(context)
 
     def _clean_up(self, context: bpy.types.Context) -> None:
-        manager = context.window_manager
-        manager.event_timer_remove(self._timer)
-        manager.progress_end()
+        context.window_manager.event_timer_remove(self._timer)
+        context.window_manager.eso_last_run.running = ""
         if context.workspace is not None:
             context.workspace.status_text_set(None)
+        _redraw_sidebars(context)
+
+
+def _draw_status(header: bpy.types.Header, context: bpy.types.Context) -> None:
+    """Draw the bar in place of the status bar's usual hints."""
+    run = context.window_manager.eso_last_run
+    layout = header.layout
+    layout.label(text=run.running, icon="MOD_DECIM")
+    bar = layout.row()
+    bar.ui_units_x = 10
+    bar.progress(factor=run.progress, text=f"{run.progress:.0%}")
+    layout.label(text="Stopping" if run.stopping else "Cancel", icon="EVENT_ESC")
+
+
+def _redraw_sidebars(context: bpy.types.Context) -> None:
+    for window in context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type == "VIEW_3D":
+                next(region for region in area.regions if region.type == "UI").tag_redraw()

@@ -11,9 +11,6 @@ from ..core.mesh import check_mesh
 from ..core.options import options_of, targets_of
 from ..core.recording import Recording, recording_steps, scaled
 
-# What changes the finished levels but not the run.
-_NOT_IN_THE_RUN = {"refit": False, "threads": None}
-
 _kept: dict[str, Recording] = {}
 
 
@@ -51,7 +48,7 @@ def replayed_steps(
         *(targets.get(name) for name in ("ratios", "faces_targets", "max_errors")),
         needed=chosen.method != "feature",
     )
-    key = fingerprint(original, replace(chosen, **_NOT_IN_THE_RUN))
+    key = fingerprint(original, replace(chosen, refit=False, threads=None))  # neither changes the run
     recording = _kept.get(key)
     replayed = recording is not None
     if recording is None:

@@ -4,13 +4,15 @@
 import bpy
 from bpy.app.handlers import persistent
 
+from ..jobs import replay
 from ..jobs.worker import stop_all
 
 
 @persistent
 def stop_before_load(*_: object) -> None:
-    """Join the threads: what they read belongs to the file that goes."""
+    """Join the threads and forget the last run: what they read belongs to the file that goes."""
     stop_all()
+    replay.forget()
 
 
 def register() -> None:
@@ -19,7 +21,7 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Join the threads and listen no more."""
-    stop_all()
+    """Join the threads, forget the last run, and listen no more."""
+    stop_before_load()
     if stop_before_load in bpy.app.handlers.load_pre:
         bpy.app.handlers.load_pre.remove(stop_before_load)

@@ -3,14 +3,12 @@
 # mypy: disable-error-code="valid-type"
 """The operator that measures how far the active mesh deviates from its original."""
 
-from collections.abc import Generator
-
 import bpy
 import numpy as np
 from bpy.props import BoolProperty, EnumProperty, IntProperty
 
 from ..bridge.read_mesh import MeshArrays, read_mesh
-from ..core.deviation import Deviation, measure
+from ..core.deviation import Deviation, measure_steps
 from ..jobs.modal import EngineOperator
 from ..jobs.worker import Steps
 from .polls import measured_pair, poll_with, why_not_measure
@@ -48,7 +46,8 @@ class OBJECT_OT_eso_measure(EngineOperator, bpy.types.Operator):
         """Read both meshes."""
         original, simplified = measured_pair(context)
         self._title = f"{simplified.name} against {original.name}"
-        return _measure_steps(self._read(original), self._read(simplified), self.samples)
+        one, other = self._read(original), self._read(simplified)
+        return measure_steps(one.vertices, one.triangles, other.vertices, other.triangles, samples=self.samples)
 
     def finish(self, context: bpy.types.Context, result: Deviation) -> None:
         """Report the figures; nothing is written."""
@@ -70,10 +69,3 @@ class OBJECT_OT_eso_measure(EngineOperator, bpy.types.Operator):
 
 
 OPERATOR = OBJECT_OT_eso_measure
-
-
-def _measure_steps(original: MeshArrays, simplified: MeshArrays, samples: int) -> Generator[float, None, Deviation]:
-    yield 0.0
-    return measure(
-        original.vertices, original.triangles, simplified.vertices, simplified.triangles, samples=samples
-    )

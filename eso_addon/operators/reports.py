@@ -5,6 +5,8 @@ from collections.abc import Iterable
 
 import bpy
 
+from ..bridge import objects
+
 
 def tell(
     operator: bpy.types.Operator,
@@ -25,6 +27,20 @@ def triangles(before: int, after: int) -> str:
     """Give both counts and the share that is left."""
     share = f" ({after / before:.1%})" if before else ""
     return f"{before:,} to {after:,} triangles{share}"
+
+
+def error_text(error: float | None) -> str:
+    """Give the error, or say that it is being found."""
+    return "error follows" if error is None else f"error {error:.3g}"
+
+
+def tell_error(name: str, error: float) -> None:
+    """Add an error that was found later: to the object of this name if it is a result, and to the panel."""
+    obj = bpy.data.objects.get(name)
+    if obj is not None and objects.SOURCE in obj:
+        obj[objects.ERROR] = error
+    last_run = bpy.context.window_manager.eso_last_run
+    last_run.lines = last_run.lines.replace(error_text(None), error_text(error))
 
 
 def notes_of(left_behind: Iterable[str], *results: "object") -> list[str]:

@@ -4,7 +4,7 @@
 """The panel's settings, saved with the scene, and the figures of the last run, kept for the session."""
 
 import bpy
-from bpy.props import PointerProperty, StringProperty
+from bpy.props import BoolProperty, FloatProperty, PointerProperty, StringProperty
 
 from .lod_options import LodOptions
 from .options import SimplifyOptions
@@ -22,10 +22,13 @@ class ESO_PG_settings(SimplifyOptions, LodOptions, bpy.types.PropertyGroup):
 
 
 class ESO_PG_last_run(bpy.types.PropertyGroup):
-    """What the last run reported, one line each."""
+    """How far the run is that goes on, and what the last one reported, one line each."""
 
     title: StringProperty()
     lines: StringProperty()
+    running: StringProperty()
+    progress: FloatProperty()
+    stopping: BoolProperty()
 
     def show(self, title: str, *lines: str) -> None:
         """Keep a report for the panel."""

@@ -51,6 +51,7 @@ class Operator(EngineOperator):
 @pytest.fixture
 def context(monkeypatch: pytest.MonkeyPatch) -> MagicMock:
     monkeypatch.setattr(modal, "bpy", SimpleNamespace(app=SimpleNamespace(background=False), types=bpy.types))
+    monkeypatch.setattr(modal, "_SHOW_SECONDS", 0.0)
     return MagicMock()
 
 
@@ -68,14 +69,17 @@ def ended(operator: Operator, context: MagicMock) -> set[str]:
 
 def assert_cleaned_up(context: MagicMock) -> None:
     context.window_manager.event_timer_remove.assert_called_once()
-    context.window_manager.progress_end.assert_called_once()
+    assert context.window_manager.eso_last_run.running == ""
     context.workspace.status_text_set.assert_called_with(None)
 
 
 def test_the_result_is_written_once_at_the_end(context: MagicMock) -> None:
     operator = started(Operator(), context)
     assert operator.written == []
-    assert "Esc" in context.workspace.status_text_set.call_args.args[0]
+    draw = context.workspace.status_text_set.call_args.args[0]
+    header = MagicMock()
+    draw(header, context)
+    assert header.layout.row().progress.call_args.kwargs == {"factor": 0.5, "text": "50%"}
     assert ended(operator, context) == {"FINISHED"}
     assert operator.written == [42]
     assert operator.seconds > 0
