@@ -20,8 +20,16 @@ _FLAT = 1e-6
 _STRAIGHT = 0.5
 
 
-def guide_for(mesh: Prepared, options: Options) -> FeatureGuide:
-    """Make the guide of a mesh: its boundary, the edges beyond an angle and those that the options name are sharp."""
+def guide_for(mesh: Prepared, options: Options, lines: Ints | None = None) -> FeatureGuide:
+    """Make the guide of a mesh: boundaries, edges beyond an angle, those that the options name and `lines` are sharp.
+
+    Parameters
+    ----------
+    mesh : Prepared
+    options : Options
+    lines : ndarray, (2, s) int64, optional
+        Edges of the engine's mesh.
+    """
     pairs = None
     if options.sharp is not None:
         pairs = np.asarray(options.sharp)
@@ -32,6 +40,8 @@ def guide_for(mesh: Prepared, options: Options) -> FeatureGuide:
         if pairs.size and (pairs.min() < 0 or pairs.max() >= len(mesh.vertex)):
             raise MeshError(f"sharp names a vertex that is not there ({len(mesh.vertex)} vertices)")
         pairs = mesh.vertex.take(pairs)
+    if lines is not None:
+        pairs = lines.T if pairs is None else np.concatenate((pairs, lines.T))
     sharp = sharp_edges(mesh.points.T, mesh.faces.T, marked=pairs, angle=options.sharp_angle)
     return FeatureGuide(sharp, options.epsilon, mesh.points.shape[1])
 

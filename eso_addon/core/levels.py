@@ -3,12 +3,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .carrier import Carrier
 from .closest import ClosestPoints
 from .deviation import measure
 from .mesh import Floats, Ints
@@ -45,6 +46,10 @@ class SimplifyResult:
         What was mended, and why a target was not reached.
     record : CollapseRecord
         The run that made it, in the engine's numbers.
+    attributes : dict of str to ndarray
+        What was carried, on the new vertices, corners, faces and edges.
+    edges : ndarray, (e, 2) int32
+        The edges that attributes on edges belong to; none where there are no such attributes.
     """
 
     vertices: Floats
@@ -55,6 +60,8 @@ class SimplifyResult:
     messages: tuple[str, ...]
     record: CollapseRecord
     original: Mesh
+    attributes: dict[str, NDArray] = field(default_factory=dict)
+    edges: Int32s = field(default_factory=lambda: np.zeros((0, 2), np.int32))
 
     @cached_property
     def error(self) -> float:
@@ -71,8 +78,8 @@ def in_input_units(record: CollapseRecord, mesh: Prepared, vertices: Floats) -> 
 
 
 def level(mesh: Prepared, record: CollapseRecord, original: Mesh, length: int,
-           options: Options) -> SimplifyResult:
-    """Build the mesh after so many collapses, refitted, in the input's numbers."""
+           options: Options, carrier: Carrier | None = None) -> SimplifyResult:
+    """Build the mesh after so many collapses, refitted, in the input's numbers, with what the carrier puts on it."""
     vertices, faces = original
     points, corners, face_map, survivor = record.level(vertices[mesh.source], mesh.faces.T, length)
     if mesh.turned is not None:
@@ -88,7 +95,13 @@ def level(mesh: Prepared, record: CollapseRecord, original: Mesh, length: int,
     vertex_map = np.where(mesh.vertex >= 0, merged.take(mesh.vertex, mode="clip"), -1)
     if options.refit and options.moves and length:
         # the engine's vertices stand for the input's, so that seams stay closed
-        placed = refit(placed, corners, vertices[mesh.source], mesh.faces.T, vertex_map=merged)
+        placed = refit(placed, corners, vertices[mesh.source], mesh.faces.T, vertex_map=merged,
+                       fixed=None if carrier is None else carrier.held(merged, len(placed)))
+    if carrier is not None:
+        carried = carrier.carry(placed, corners, face_map, merged)
+        return SimplifyResult(carried.points, carried.corners.astype(np.int32), carried.vertex_map.astype(np.int32),
+                              mesh.face[face_map].astype(np.int32), True, (*mesh.messages, *carrier.messages(len(corners))),
+                              record, original, carried.attributes, carried.edges.astype(np.int32))
     face_map = mesh.face[face_map]
     if mesh.sheet is not None:
         placed, corners, vertex_map = _split(mesh.sheet, faces[face_map], placed, corners, vertex_map)
@@ -119,7 +132,7 @@ def judge_count(result: SimplifyResult, target: int, options: Options) -> Simpli
 
 
 def within(mesh: Prepared, record: CollapseRecord, original: Mesh, limit: float,
-            options: Options) -> SimplifyResult:
+            options: Options, carrier: Carrier | None = None) -> SimplifyResult:
     """Find a long prefix of the record whose measured deviation stays within a limit.
 
     The costs are no distances, so the deviation is measured: with probes while the prefix is sought, and at the end as
@@ -139,11 +152,11 @@ def within(mesh: Prepared, record: CollapseRecord, original: Mesh, limit: float,
             break
     while low:
         for chosen in (options, plain) if options.refit else (plain,):
-            result = level(mesh, record, original, low, chosen)
+            result = level(mesh, record, original, low, chosen, carrier)
             if measure(*original, result.vertices, result.faces).symmetric.maximum <= limit:
                 return result
         low = max(low - (mesh.faces.shape[1] - low) // 20 - 1, 0)
-    return level(mesh, record, original, 0, plain)
+    return level(mesh, record, original, 0, plain, carrier)
 
 
 class _Probes:

@@ -3,18 +3,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .attributes import Attribute
 from .collapse import Rules
 from .mesh import MeshError
 from .variation import METHODS as WEIGHTS
 
 METHODS = (*WEIGHTS, "feature")
+LINES = ("kept", "locked", "ignored")
 
 
 @dataclass(frozen=True)
@@ -50,6 +52,19 @@ class Options:
         Drop connected parts whose bounding box has a smaller diagonal, in the mesh's units.
     refit : bool
         Move the survivors afterwards so that the surface fits the original; only with optimal placement.
+    attributes : mapping of str to array_like or Attribute, optional
+        What the mesh carries; see `attributes.check_attributes`.
+    edges : array_like, (e, 2) int, optional
+        The edges that attributes on edges belong to, as pairs of input vertices.
+    seam_lines, material_lines, sharp_lines, boundary_lines : str
+        What becomes of seams of UV and other values, borders of materials, sharp edges and open boundaries: "kept"
+        (simplified along themselves, never across), "locked" (not touched) or "ignored".
+    line_weight : float
+        Weight of the quadrics that hold lines in their place.
+    locked : array_like, (n,) bool, optional
+        Vertices that neither go nor move.
+    importance : array_like, (n,) float, optional
+        What errors at each vertex count; one is as usual.
     threads : int, optional
         All processors, at most four, where not given. The result does not depend on it.
     """
@@ -71,6 +86,15 @@ class Options:
     weld: bool = True
     prune: float = 0.0
     refit: bool = True
+    attributes: Mapping[str, ArrayLike | Attribute] | None = None
+    edges: ArrayLike | None = None
+    seam_lines: str = "kept"
+    material_lines: str = "kept"
+    sharp_lines: str = "kept"
+    boundary_lines: str = "kept"
+    line_weight: float = 10.0
+    locked: ArrayLike | None = None
+    importance: ArrayLike | None = None
     threads: int | None = None
 
     def __post_init__(self) -> None:
@@ -87,6 +111,10 @@ class Options:
         number("share", self.share, 1e-6, 1)
         number("spread", self.spread, 1, np.inf)
         number("prune", self.prune, 0, np.inf)
+        number("line_weight", self.line_weight, 0, 1e6)
+        for name in ("seam_lines", "material_lines", "sharp_lines", "boundary_lines"):
+            if getattr(self, name) not in LINES:
+                raise MeshError(f"{name} is {getattr(self, name)!r}: choose one of {', '.join(LINES)}")
         if self.epsilon is not None:
             number("epsilon", self.epsilon, -1, 1)
         if self.sharp_angle is not None:

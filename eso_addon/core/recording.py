@@ -8,8 +8,10 @@ from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
 from .blocks import Blocks
+from .carrier import Carrier
 from .collapse import collapse_steps
 from .feature_collapse import guide_for
+from .guidance import guidance_of
 from .levels import Mesh, SimplifyResult, in_input_units, judge_count, level, within
 from .options import Options
 from .prepare import Prepared, prepare
@@ -33,6 +35,8 @@ class Recording:
     options : Options
     least : int
         Triangles at which the run was told to stop.
+    carrier : Carrier, optional
+        Puts on the levels what the mesh carries.
     """
 
     mesh: Prepared
@@ -40,6 +44,7 @@ class Recording:
     original: Mesh
     options: Options
     least: int
+    carrier: Carrier | None = None
 
     def reaches(self, count: int) -> bool:
         """Tell whether the level of so many triangles is in the record, or is out of the engine's reach anyway."""
@@ -60,11 +65,12 @@ class Recording:
         options = self.options if refit is None else replace(self.options, refit=refit)
         results: list[SimplifyResult] = []
         for count in counts:
-            result = level(self.mesh, self.record, self.original, self.record.length_for(count), options)
+            result = level(self.mesh, self.record, self.original, self.record.length_for(count), options,
+                           self.carrier)
             results.append(judge_count(result, count, options))
             yield len(results) / len(counts)
         for error in errors:
-            results.append(within(self.mesh, self.record, self.original, error, options))
+            results.append(within(self.mesh, self.record, self.original, error, options, self.carrier))
             yield len(results) / len(errors)
         return results
 
@@ -83,15 +89,17 @@ def recording_steps(original: Mesh, options: Options, least: int) -> Generator[f
     blocks = Blocks(options.threads)
     try:
         yield 0.02
-        guide = guide_for(mesh, options) if options.method == "feature" else None
-        quadrics = initial_quadrics(mesh, options, blocks)
+        guidance = guidance_of(mesh, original, options)
+        guide = guide_for(mesh, options, guidance.edges) if options.method == "feature" else None
+        quadrics = initial_quadrics(mesh, options, blocks, guidance)
         yield 0.12
-        run = collapse_steps(mesh.points, mesh.faces, quadrics, mesh.opened, None, least, options.rules, blocks, guide)
+        run = collapse_steps(mesh.points, mesh.faces, quadrics, mesh.opened, guidance.locked, least, options.rules,
+                             blocks, guide, guidance.guard)
         total = max(mesh.faces.shape[1] - least, 1)
         record = yield from scaled(run, lambda left: 0.12 + 0.88 * (1 - (left - least) / total))
     finally:
         blocks.close()
-    return Recording(mesh, in_input_units(record, mesh, original[0]), original, options, least)
+    return Recording(mesh, in_input_units(record, mesh, original[0]), original, options, least, guidance.carrier)
 
 
 def scaled(steps: Generator[Any, None, Value], scale: Any) -> Generator[float, None, Value]:  # noqa: ANN401

@@ -4,6 +4,8 @@
 import numpy as np
 
 from .blocks import Blocks
+from .guidance import Guidance
+from .lines import Lines
 from .mesh import Floats
 from .options import Options
 from .prepare import Prepared
@@ -11,7 +13,7 @@ from .quadrics import anchored, area_normals, boundary_quadrics, plane_quadrics
 from .variation import surface_variation
 
 
-def initial_quadrics(mesh: Prepared, options: Options, blocks: Blocks) -> Floats:
+def initial_quadrics(mesh: Prepared, options: Options, blocks: Blocks, guidance: Guidance | None = None) -> Floats:
     """Weigh the mesh: Equation 9, and the planes that hold boundaries.
 
     Parameters
@@ -19,6 +21,8 @@ def initial_quadrics(mesh: Prepared, options: Options, blocks: Blocks) -> Floats
     mesh : Prepared
     options : Options
     blocks : Blocks
+    guidance : Guidance, optional
+        Lines that are held in their place too, and what each vertex counts.
 
     Returns
     -------
@@ -28,17 +32,33 @@ def initial_quadrics(mesh: Prepared, options: Options, blocks: Blocks) -> Floats
     if options.method == "feature":
         return np.zeros((mesh.points.shape[1], 0))
     parts = plane_quadrics(mesh.points, mesh.faces, area_weighted=options.area_weighted)
-    if options.boundary_weight > 0 and len(mesh.boundary):
+    if options.boundary_weight > 0 and len(mesh.boundary) and options.boundary_lines != "ignored":
         sides = mesh.boundary
         normals, areas = area_normals(mesh.points, mesh.faces)
         face = sides % mesh.faces.shape[1]
         edges = np.stack((mesh.faces.ravel().take(sides), np.roll(mesh.faces, -1, axis=0).ravel().take(sides)))
         parts += boundary_quadrics(mesh.points, normals.take(face, axis=1) / np.maximum(areas.take(face), 1e-300),
                                    edges, options.boundary_weight)
+    if guidance is not None and guidance.lines is not None and options.line_weight > 0:
+        parts += line_quadrics(mesh.points, guidance.lines, options.line_weight)
     if options.method in ("so", "eso"):
         rings = 1 if options.method == "so" else int(options.rings)
         weights = surface_variation(mesh.points.T, mesh.faces.T, rings, blocks)
         mean = weights.mean()
         if mean > 0:
             parts *= np.maximum(weights / mean, 1e-6) ** options.weight_power
+    if guidance is not None and guidance.importance is not None:
+        parts *= guidance.importance
     return anchored(parts, mesh.points, options.memory)
+
+
+def line_quadrics(points: Floats, lines: Lines, weight: float) -> Floats:
+    """Sum planes through line edges, perpendicular to both their faces: (6, n) float64; see `boundary_quadrics`."""
+    sides = lines.pairs.compress(lines.kinds > 0, axis=1)
+    normals, areas = area_normals(points, lines.faces)
+    parts = np.zeros((6, points.shape[1]))
+    for ends in (sides[:2], sides[2:]):
+        face = ends[0] % lines.faces.shape[1]
+        parts += boundary_quadrics(points, normals.take(face, axis=1) / np.maximum(areas.take(face), 1e-300),
+                                   lines.faces.ravel().take(ends), weight / 2)
+    return parts

@@ -1,0 +1,155 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Carries all attributes of a mesh to its levels, and parts their vertices again where the input's were parted."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .adjacency import components
+from .attributes import AttributeSet, Layer, blended
+from .blocks import Blocks
+from .carry import Places, find_places
+from .edge_data import carried_edges
+from .line_guard import LineGuard
+from .lines import Lines
+from .mesh import Bools, Floats, Ints
+from .prepare import Prepared
+
+
+class Carried(NamedTuple):
+    """A level with all that it carries: vertices as the input parts them.
+
+    Attributes
+    ----------
+    points : ndarray, (k, 3) float64
+    corners : ndarray, (m, 3) int64
+    vertex_map : ndarray, (n,) int64
+    attributes : dict of str to ndarray
+    edges : ndarray, (e, 2) int64
+        What edge attributes belong to.
+    """
+
+    points: Floats
+    corners: Ints
+    vertex_map: Ints
+    attributes: dict[str, NDArray]
+    edges: Ints
+
+
+class Carrier:
+    """What a mesh carries, ready to be put on any of its levels.
+
+    Parameters
+    ----------
+    mesh : Prepared
+    original : tuple of ndarray
+        The input: vertices (n, 3) float64 and faces (m, 3) int64.
+    attributes : AttributeSet
+    lines : Lines
+    locked : ndarray, (engine's vertices,) bool
+    guard : LineGuard, optional
+        The one that the run has.
+    """
+
+    def __init__(self, mesh: Prepared, original: tuple[Floats, Ints], attributes: AttributeSet, lines: Lines,
+                 locked: Bools, guard: LineGuard | None = None) -> None:
+        self._mesh, self._attributes, self._lines, self._guard = mesh, attributes, lines, guard
+        self._points = np.ascontiguousarray(original[0].take(mesh.source, axis=0).T)
+        self._vertex = original[1].ravel().take(lines.corner)  # the input's vertex at each corner
+        self._held = locked.copy()
+        self._held[lines.edges] = True
+
+    def held(self, survivor: Ints, count: int) -> Bools:
+        """Tell the level's vertices, (count,) bool, that stand on lines or are locked: a refit must leave them."""
+        held = np.zeros(count + 1, bool)
+        held[survivor.compress(self._held)] = True  # those that are gone write beyond the end
+        return held[:-1]
+
+    def messages(self, faces_left: int) -> tuple[str, ...]:
+        """Say what was mended, and whether a level of so many faces had to cross lines."""
+        released = None if self._guard is None else self._guard.released_at
+        crossed = () if released is None or faces_left >= released else (
+            f"below {released} triangles seams, borders and sharp edges were crossed: nothing else was left to go",)
+        return (*self._attributes.messages, *self._lines.messages, *crossed)
+
+    def carry(self, placed: Floats, corners: Ints, face_map: Ints, survivor: Ints) -> Carried:
+        """Put everything on a level.
+
+        Parameters
+        ----------
+        placed : ndarray, (k, 3) float64
+            Positions of the level's vertices.
+        corners : ndarray, (f, 3) int64
+            Wound as in the input.
+        face_map : ndarray, (f,) int64
+            The engine's face of each.
+        survivor : ndarray, (engine's vertices,) int64
+            The level's vertex that each has become, -1 if it is gone.
+        """
+        there = np.concatenate((placed.T, np.zeros((3, 1))), axis=1)
+        survivor = np.where(survivor < 0, len(placed), survivor)
+        blocks = Blocks()
+        try:
+            places = find_places(self._lines, self._points, survivor, there, blocks)
+        finally:
+            blocks.close()
+        # the engine may wind a face the other way than the input does
+        rows = np.tile(np.arange(3)[:, None], len(face_map))
+        if self._mesh.turned is not None:
+            rows[1:, self._mesh.turned[face_map]] = [[2], [1]]
+        slot = (rows * self._lines.faces.shape[1] + face_map).T.ravel()
+        target = places.target.ravel().take(slot)
+        number, wedge_of, vertex_map = self._part(places, slot, target)
+        unmoved = (self._points.take(self._lines.faces.ravel().take(slot), axis=1)
+                   == there.take(corners.ravel(), axis=1)).all(axis=0)
+        carried = {}
+        for layer in self._attributes.layers:
+            if layer.domain == "corner":
+                values = self._at_wedges(layer, places, self._lines.corner).take(target, axis=0)
+                values[unmoved] = layer.rows.take(self._lines.corner.ravel().take(slot[unmoved]), axis=0)
+            elif layer.domain == "vertex":
+                values = self._at_wedges(layer, places, self._vertex).take(wedge_of, axis=0)
+            elif layer.domain == "face":
+                values = layer.rows.take(self._mesh.face.take(face_map), axis=0)
+            else:
+                continue
+            carried[layer.name] = layer.shaped(values)
+        points, parted = placed.take(places.vertex.take(wedge_of), axis=0), number.reshape(-1, 3)
+        edges, on_edges = carried_edges(self._attributes, self._points, self._mesh.vertex, self._lines, survivor,
+                                        places.vertex.take(wedge_of), parted, placed)
+        return Carried(points, parted, vertex_map, {**carried, **on_edges}, edges)
+
+    def _at_wedges(self, layer: Layer, places: Places, elements: Ints) -> NDArray:
+        return blended(layer, elements.take(places.face, axis=1), places.weights)
+
+    def _part(self, places: Places, slot: Ints, target: Ints) -> tuple[Ints, Ints, Ints]:
+        """Part the level's vertices as the input's are: at lines where its faces have different vertices.
+
+        Returns the vertex of each of the level's corners, a wedge of each vertex, and the input's vertex map.
+        """
+        wedges, vertex = places.target.ravel(), self._vertex.ravel()
+        one = np.full(len(self._mesh.vertex), -1)
+        one[vertex] = np.arange(len(vertex))  # of several the last holds
+        other = wedges.take(one.take(vertex))
+        apart = np.flatnonzero(wedges != other)
+        group = components(len(places.vertex), wedges.take(apart), other.take(apart))
+        group = _in_order(group, places.vertex)
+        sheet = np.zeros(len(one), np.int64) if self._mesh.sheet is None else self._mesh.sheet
+        count = int(sheet.max(initial=0)) + 1
+        keys, first, number = np.unique(group.take(target) * count + sheet.take(vertex.take(slot)),
+                                        return_index=True, return_inverse=True)
+        wanted = np.where(one < 0, -1, group.take(wedges.take(one, mode="clip")) * count + sheet)
+        found = np.searchsorted(keys, wanted).clip(max=len(keys) - 1)
+        return number.ravel(), target.take(first), np.where(keys[found] == wanted, found, -1)
+
+
+def _in_order(group: Ints, vertex: Ints) -> Ints:
+    """Renumber groups of wedges by their vertices."""
+    vertex_of = np.zeros(int(group.max(initial=-1)) + 1, np.int64)
+    vertex_of[group] = vertex
+    rank = np.empty(len(vertex_of), np.int64)
+    rank[np.argsort(vertex_of, kind="stable")] = np.arange(len(vertex_of))
+    return rank.take(group)

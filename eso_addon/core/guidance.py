@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What guides a run besides the shape: lines of the attributes, vertices that are locked, and what each counts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .attributes import check_attributes
+from .carrier import Carrier
+from .line_guard import LineGuard
+from .lines import MATERIAL, SEAM, SHARP, Lines, find_lines
+from .mesh import Bools, Floats, Ints, MeshError
+from .options import Options
+from .prepare import Prepared
+
+
+@dataclass(frozen=True, eq=False)
+class Guidance:
+    """What the engine is told about one mesh; None where there is nothing to tell.
+
+    Attributes
+    ----------
+    lines : Lines, optional
+    guard : LineGuard, optional
+    locked : ndarray, (n,) bool, optional
+    importance : ndarray, (n,) float64, optional
+    carrier : Carrier, optional
+    """
+
+    lines: Lines | None
+    guard: LineGuard | None
+    locked: Bools | None
+    importance: Floats | None
+    carrier: Carrier | None
+
+    @property
+    def edges(self) -> Ints | None:
+        """The edges of the lines, (2, s) int64."""
+        return None if self.lines is None else self.lines.edges
+
+
+def guidance_of(mesh: Prepared, original: tuple[Floats, Ints], options: Options) -> Guidance:
+    """Find what guides the run on a mesh.
+
+    Parameters
+    ----------
+    mesh : Prepared
+    original : tuple of ndarray
+        Vertices (n, 3) float64 and faces (m, 3) int64 as they were given.
+    options : Options
+
+    Raises
+    ------
+    MeshError
+        An attribute, the locked vertices or their importance do not fit the mesh.
+    """
+    vertices, faces = original
+    locked = np.zeros(mesh.points.shape[1], bool)
+    if options.boundary_lines == "locked":
+        locked[mesh.faces.ravel().take(mesh.boundary)] = True
+        locked[np.roll(mesh.faces, -1, axis=0).ravel().take(mesh.boundary)] = True
+    if options.locked is not None:
+        chosen = _per_vertex("locked", options.locked, len(vertices)) != 0
+        locked[mesh.vertex[chosen & (mesh.vertex >= 0)]] = True
+    importance = _importance(mesh, options, len(vertices))
+    if not options.attributes and not locked.any():
+        return Guidance(None, None, None, importance, None)
+    attributes = check_attributes(options.attributes or {}, len(vertices), len(faces), options.edges)
+    modes = {SEAM: options.seam_lines, MATERIAL: options.material_lines, SHARP: options.sharp_lines}
+    lines = find_lines(mesh, faces, attributes, sum(bit for bit, mode in modes.items() if mode == "ignored"))
+    for bit, mode in modes.items():
+        if mode == "locked":
+            locked[lines.along(bit)] = True
+    guard = None
+    if (lines.kinds > 0).any() and options.method != "feature":
+        guard = LineGuard(lines.edges, lines.kinds.compress(lines.kinds > 0), mesh.opened)
+    carrier = Carrier(mesh, original, attributes, lines, locked, guard)
+    return Guidance(lines, guard, locked if locked.any() else None, importance, carrier)
+
+
+def _importance(mesh: Prepared, options: Options, count: int) -> Floats | None:
+    if options.importance is None:
+        return None
+    given = _per_vertex("importance", options.importance, count).astype(np.float64)
+    if not (np.isfinite(given).all() and (given >= 0).all()):
+        raise MeshError("importance must be 0 or more at every vertex")
+    # of vertices at one place the most important counts; nothing at all could not be solved
+    most = np.zeros(mesh.points.shape[1])
+    used = np.flatnonzero(mesh.vertex >= 0)
+    np.maximum.at(most, mesh.vertex[used], given[used])
+    return np.maximum(most, 1e-6)
+
+
+def _per_vertex(name: str, values: object, count: int) -> np.ndarray:
+    array = np.asarray(values)
+    if array.shape != (count,) or array.dtype.kind not in "fiub":
+        raise MeshError(f"{name} must be an array of {count} numbers, one for each vertex, not {array.shape} "
+                        f"{array.dtype}")
+    return array
