@@ -6,19 +6,21 @@ def register() -> None:
     """Register the operators; threads end before another file is loaded."""
     import bpy
 
-    from . import lifetime, lod_generate, measure, simplify
+    from . import lifetime, lod_generate, lod_update, measure, simplify, staleness
 
-    for module in (simplify, lod_generate, measure):
+    for module in (simplify, lod_generate, lod_update, measure):
         bpy.utils.register_class(module.OPERATOR)
     lifetime.register()
+    staleness.register()
 
 
 def unregister() -> None:
     """End every thread and unregister the operators."""
     import bpy
 
-    from . import lifetime, lod_generate, measure, simplify
+    from . import lifetime, lod_generate, lod_update, measure, simplify, staleness
 
+    staleness.unregister()
     lifetime.unregister()
-    for module in (measure, lod_generate, simplify):
+    for module in (measure, lod_update, lod_generate, simplify):
         bpy.utils.unregister_class(module.OPERATOR)

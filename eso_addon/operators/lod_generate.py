@@ -1,34 +1,38 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The operator that makes a chain of levels of detail of the active mesh, in one run of the engine."""
+"""The operator that makes levels of detail of all chosen meshes, in one run of the engine for each."""
 
 import bpy
 
-from ..bridge import objects
-from ..bridge.read_mesh import MeshArrays, read_mesh
-from ..bridge.write_mesh import write_mesh
-from ..core.simplify import SimplifyResult, lod_chain_steps
+from ..bridge import level_info, objects
+from ..bridge.lod_sources import LodSource, meshes_behind, name_meshes, read_sources, told_of, write_chain
+from ..bridge.place_levels import Place, place_levels, plan_places
+from ..core.chains import Chain, chains_steps
+from ..core.mesh import MeshError
 from ..jobs.modal import EngineOperator
 from ..jobs.worker import Steps
 from ..settings.lod_options import LodOptions
-from .polls import poll_with, why_not_simplify
-from .probing import with_errors
+from ..settings.lod_record import LodSettings
+from ..settings.profiles import PROFILES
+from .lod_polls import why_not_generate
+from .polls import poll_with
 from .reports import notes_of, tell
 
 
 class OBJECT_OT_eso_lod_generate(EngineOperator, LodOptions, bpy.types.Operator):
-    """Make levels of detail of the active mesh as new objects in a collection; the mesh itself stays as it is"""
+    """Make levels of detail of the selected meshes as new objects in collections; the meshes stay as they are"""
 
     bl_idname = "object.eso_lod_generate"
     bl_label = "ESO Generate LODs"
     bl_options = {"REGISTER", "UNDO", "PRESET"}
 
-    _object: bpy.types.Object
-    _source: MeshArrays
+    _settings: LodSettings
+    _sources: list[LodSource]
+    _places: list[Place]
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Need an active mesh object."""
-        return poll_with(cls, why_not_simplify(context))
+        """Need meshes, or a collection that may have some."""
+        return poll_with(cls, why_not_generate(context))
 
     def draw(self, _context: bpy.types.Context) -> None:
         """Draw the redo panel."""
@@ -36,40 +40,78 @@ class OBJECT_OT_eso_lod_generate(EngineOperator, LodOptions, bpy.types.Operator)
         self.draw_levels(self.layout)
         self.draw_engine(self.layout)
 
-    def prepare(self, context: bpy.types.Context) -> Steps[list[SimplifyResult]]:
-        """Read the active mesh."""
-        targets, options = self.lod_targets(), self.engine_options()
-        self._object = context.active_object
-        self._source = read_mesh(self._object, apply_modifiers=self.apply_modifiers)
-        return with_errors(lod_chain_steps(self._source.vertices, self._source.triangles, **targets, **options))
+    def prepare(self, context: bpy.types.Context) -> Steps[list[Chain]]:
+        """Read the meshes, and see that their levels will have names and places."""
+        self._settings = self.lod_settings()
+        goals, options = self._settings.goals(), self._settings.options()
+        self._sources = read_sources(
+            self._chosen(context), apply_modifiers=self.apply_modifiers, live_types=self._settings.live
+        )
+        if not self._sources:
+            raise MeshError("no mesh with faces is chosen: select one, or choose a collection that has some")
+        everyone = [obj for source in self._sources for obj in source.objects]
+        name = PROFILES[self.profile].scene_name
+        self._places = plan_places(
+            everyone, len(goals.values), name, collection=self.collection, replace=self.replace
+        )
+        meshes = [(source.arrays.vertices, source.arrays.triangles) for source in self._sources]
+        return chains_steps(meshes, goals, options, [len(source.objects) for source in self._sources])
 
-    def finish(self, context: bpy.types.Context, result: list[SimplifyResult]) -> None:
+    def finish(self, context: bpy.types.Context, result: list[Chain]) -> None:
         """Write the levels as objects, the finest first."""
-        obj, before = self._object, len(self._source.triangles)
-        collection = objects.level_collection(self.collection or f"{obj.name}_LODs", context.scene)
-        objects.leave_edit_mode(obj)
-        notes = notes_of(self._source.left_behind, *result)
-        if self.replace and (removed := objects.remove_levels(obj, collection)):
-            notes.append(f"Replaced {removed} earlier levels")
-        levels = [
-            objects.add_object(
-                obj,
-                write_mesh(level, self._source, f"{obj.name}_LOD{number}"),
-                f"{obj.name}_LOD{number}",
-                [collection],
-                modifiers_applied=self.apply_modifiers,
-                properties=objects.result_properties(obj, before, len(level.faces), level.error),
+        place_of = {place.source: place for place in self._places}
+        made: list[bpy.types.Object] = []
+        for source, chain in zip(self._sources, result, strict=True):
+            names = place_of[source.objects[0]].names
+            levels = write_chain(source, chain, names)
+            settings = level_info.settings_text(
+                self._settings.stored([len(level.result.faces) for level in chain.levels])
             )
-            for number, level in enumerate(result)
-        ]
-        objects.select_only(levels, context.view_layer)
-        objects.join_local_view(levels, context.space_data)
-        counts = [len(level.faces) for level in result]
-        lines = [
-            f"LOD{number} {count:,} ({count / max(before, 1):.1%}), error {level.error:.3g}"
-            for number, (count, level) in enumerate(zip(counts, result, strict=True))
-        ]
-        tell(self, context, f"Levels of {obj.name}", [f"{before:,} triangles", *lines, f"{self.seconds:.2f} s"], notes)
+            for obj in source.objects:
+                objects.leave_edit_mode(obj)
+                own = [told_of(level, obj, settings, self.profile) for level in levels]
+                made += place_levels(
+                    place_of[obj], own, context.scene, modifiers_applied=self.apply_modifiers, live=source.live
+                )
+            name_meshes(levels, names)
+        objects.select_only(made, context.view_layer)
+        objects.join_local_view(made, context.space_data)
+        self._tell(context, result)
+
+    def _chosen(self, context: bpy.types.Context) -> list[bpy.types.Object]:
+        if self.scope == "COLLECTION":
+            return meshes_behind(_collection(context, self.source_collection).all_objects)
+        chosen = [context.active_object, *context.selected_objects]
+        return meshes_behind(obj for obj in chosen if obj is not None)
+
+    def _tell(self, context: bpy.types.Context, chains: list[Chain]) -> None:
+        lines = []
+        for source, chain in zip(self._sources, chains, strict=True):
+            before = len(source.arrays.triangles)
+            many = len(self._sources) > 1
+            lines.append(f"{source.objects[0].name}: {before:,} triangles" if many else f"{before:,} triangles")
+            name = PROFILES[self.profile].scene_name
+            lines += [
+                f"{name('', number).lstrip('_')} {len(level.result.faces):,} "
+                f"({len(level.result.faces) / max(before, 1):.1%}), error {level.result.error:.3g}, "
+                f"from {level.distance:.3g} on"
+                for number, level in enumerate(chain.levels)
+            ]
+        notes = [note for source, chain in zip(self._sources, chains, strict=True)
+                 for note in notes_of(source.arrays.left_behind, chain)]
+        title = f"Levels of {self._sources[0].objects[0].name}"
+        more = len(self._places) - 1
+        tell(self, context, title + (f" and {more} more" if more else ""), [*lines, f"{self.seconds:.2f} s"],
+             dict.fromkeys(notes))
 
 
 OPERATOR = OBJECT_OT_eso_lod_generate
+
+
+def _collection(context: bpy.types.Context, name: str) -> bpy.types.Collection:
+    if not name:
+        return context.collection
+    collection = bpy.data.collections.get(name)
+    if collection is None:
+        raise MeshError(f"there is no collection '{name}': choose one that is there")
+    return collection

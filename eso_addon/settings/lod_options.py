@@ -3,13 +3,11 @@
 # mypy: disable-error-code="valid-type"
 """The options of a chain of levels as Blender properties, once, for the panel and for the operators."""
 
-from typing import Any
-
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
 from ..core.mesh import MeshError
-from ..core.screen import Screen
+from .lod_record import LodSettings
 from .options import EngineOptions
 from .profiles import PROFILES
 
@@ -121,21 +119,19 @@ class LodOptions(EngineOptions):
             raise MeshError(reason)
         return kind, goals
 
-    def lod_targets(self) -> dict[str, Any]:
-        """Give the targets as `lod_chain` takes them, finest first."""
+    def lod_settings(self) -> LodSettings:
+        """Give all of it as plain data."""
         kind, goals = self.level_goals()
-        name = {"ratio": "ratios", "error": "max_errors"}.get(kind, "faces_targets")
-        return {name: list(map(int, goals)) if name == "faces_targets" else goals}
-
-    def screen(self) -> Screen:
-        """Give the picture in which errors are judged."""
-        return Screen(resolution=self.resolution, lens=self.lens, pixels=self.pixel_error)
-
-    @property
-    def live_types(self) -> set[str]:
-        """The kinds of modifiers that stay live on the levels."""
-        wanted = {"MIRROR": self.live_mirror, "SUBSURF": self.live_subdivision}
-        return {"ARMATURE", *(kind for kind, is_wanted in wanted.items() if is_wanted)}
+        live = {"ARMATURE": True, "MIRROR": self.live_mirror, "SUBSURF": self.live_subdivision}
+        return LodSettings(
+            kind=kind,
+            values=goals,
+            screen={"resolution": self.resolution, "lens": self.lens, "pixels": self.pixel_error},
+            engine=self.engine_options(),
+            apply_modifiers=self.apply_modifiers,
+            live=[name for name, is_live in live.items() if is_live],
+            profile=self.profile,
+        )
 
 
 def ordered_goals(kind: str, goals: list[float]) -> list[float]:

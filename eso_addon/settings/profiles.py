@@ -14,6 +14,8 @@ class Profile:
         For people.
     suffixes
         What follows the object's name, finest level first; empty if every level has its index, `_LOD0`, `_LOD1`, ….
+    stand_in
+        In a scene, what takes the place of an empty suffix: there the source has the bare name already.
     most_levels
         How many levels the engine takes; None if it does not mind.
     ending
@@ -30,6 +32,7 @@ class Profile:
 
     label: str
     suffixes: tuple[str, ...] = ()
+    stand_in: str = ""
     most_levels: int | None = None
     ending: str = ".glb"
     layout: str = "siblings"
@@ -39,6 +42,11 @@ class Profile:
     def name(self, base: str, level: int) -> str:
         """Name a level, 0 being the finest."""
         return base + (self.suffixes[level] if self.suffixes else f"_LOD{level}")
+
+    def scene_name(self, base: str, level: int) -> str:
+        """Name a level that stands in a scene beside its source."""
+        name = self.name(base, level)
+        return name + self.stand_in if name == base else name
 
     def hull_name(self, base: str, number: int = 1) -> str:
         """Name a collision hull, the first one being number 1."""
@@ -60,6 +68,6 @@ PROFILES = {
     "godot": Profile("Godot", hull="{base}_Hull_{number:02}-convcolonly"),
     "gltf": Profile("glTF (MSFT_lod)", layout="msft_lod"),
     # Second Life counts from the coarsest, and its finest has no suffix.
-    "secondlife": Profile("Second Life", suffixes=("", "_LOD2", "_LOD1", "_LOD0"), most_levels=4, hull="{base}_PHYS",
-                          normal_maps=False),
+    "secondlife": Profile("Second Life", suffixes=("", "_LOD2", "_LOD1", "_LOD0"), stand_in="_LOD3", most_levels=4,
+                          hull="{base}_PHYS", normal_maps=False),
 }

@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a level knows about itself: custom properties, for the panel, for scripts, and to make it again."""
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+import bpy
+
+from .fingerprint import fingerprint
+from .objects import ERROR, RATIO, SOURCE, TRIANGLES
+
+LEVEL = "eso_level"  # 0 is the finest
+DISTANCE = "eso_switch_distance"  # from here on the level can be shown
+PROFILE = "eso_profile"
+SETTINGS = "eso_settings"  # JSON: how the levels were made
+HASH = "eso_source_hash"
+MESH = "eso_source_mesh"  # finds a source that was renamed
+STALE = "eso_stale"  # the source was edited since
+MESSAGE = "eso_message"  # what could not be done
+HULL = "eso_hull"  # a collision hull, counted from 1
+
+
+def is_level(obj: bpy.types.Object) -> bool:
+    """Tell whether an object is a level of detail."""
+    return obj.type == "MESH" and SOURCE in obj and LEVEL in obj
+
+
+def is_hull(obj: bpy.types.Object) -> bool:
+    """Tell whether an object is a collision hull made from another."""
+    return obj.type == "MESH" and SOURCE in obj and HULL in obj
+
+
+def levels_of(source: bpy.types.Object) -> list[bpy.types.Object]:
+    """List the levels made from an object, the finest first."""
+    found = [obj for obj in bpy.data.objects if is_level(obj) and find_source(obj) == source]
+    return sorted(found, key=lambda obj: (obj[LEVEL], obj.name))
+
+
+def hulls_of(source: bpy.types.Object) -> list[bpy.types.Object]:
+    """List the collision hulls made from an object."""
+    found = [obj for obj in bpy.data.objects if is_hull(obj) and find_source(obj) == source]
+    return sorted(found, key=lambda obj: (obj[HULL], obj.name))
+
+
+def find_source(level: bpy.types.Object) -> bpy.types.Object | None:
+    """Find what a level was made from, by its name or, if it was renamed, by its mesh; None if it is gone."""
+    named = bpy.data.objects.get(str(level.get(SOURCE, "")))
+    if _can_be_source(named, level):
+        return named
+    mesh = bpy.data.meshes.get(str(level.get(MESH, "")))
+    if mesh is None:
+        return None
+    taken = {str(obj[SOURCE]) for obj in bpy.data.objects if SOURCE in obj}
+    users = [obj for obj in bpy.data.objects
+             if obj.data == mesh and obj.name not in taken and _can_be_source(obj, level)]
+    return users[0] if len(users) == 1 else None
+
+
+def _can_be_source(obj: bpy.types.Object | None, level: bpy.types.Object) -> bool:
+    return obj is not None and obj.type == "MESH" and obj != level and LEVEL not in obj
+
+
+def is_stale(level: bpy.types.Object) -> bool:
+    """Tell whether the source was edited after the level was made."""
+    source = find_source(level)
+    return source is not None and HASH in level and level[HASH] != fingerprint(source)
+
+
+def level_properties(source: bpy.types.Object, level: int, before: int, after: int, error: float, distance: float,
+                     message: str) -> dict[str, object]:
+    """Give the custom properties of a level that belong to it alone."""
+    return {SOURCE: source.name, MESH: source.data.name, LEVEL: level, TRIANGLES: after, RATIO: after / max(before, 1),
+            ERROR: float(error), DISTANCE: float(distance), MESSAGE: message, STALE: False}
+
+
+def settings_text(settings: Mapping[str, Any]) -> str:
+    """Write settings as one line of JSON."""
+    return json.dumps(dict(settings), sort_keys=True)
+
+
+def settings_of(level: bpy.types.Object) -> dict[str, Any] | None:
+    """Read the settings of a level, None if it has none that can be read."""
+    try:
+        settings = json.loads(str(level.get(SETTINGS, "")))
+    except ValueError:
+        return None
+    return settings if isinstance(settings, dict) else None

@@ -1,0 +1,133 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The meshes that get levels: each read once, however many objects show it, and its levels written once."""
+
+from collections.abc import Collection, Iterable, Sequence
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from ..core.chains import Chain
+from . import level_info
+from .fingerprint import fingerprint, modifier_settings
+from .level_names import take_name
+from .modifiers import live_modifiers, switched_off
+from .place_levels import LevelMesh, note_materials
+from .read_mesh import MeshArrays, read_mesh
+from .write_mesh import write_mesh
+
+
+@dataclass(frozen=True)
+class LodSource:
+    """A mesh, and the objects that show it.
+
+    Attributes
+    ----------
+    objects : list of bpy.types.Object
+        The first one was read: the largest.
+    arrays : MeshArrays
+    live : list of str
+        Modifiers that are not in the arrays.
+    """
+
+    objects: list[bpy.types.Object]
+    arrays: MeshArrays
+    live: list[str]
+
+
+def meshes_behind(things: Iterable[bpy.types.Object]) -> list[bpy.types.Object]:
+    """List the mesh objects that stand behind objects, each once: a level stands for its source, an empty for what it
+    instances.
+    """
+    found: dict[bpy.types.Object, None] = {}
+    for obj in things:
+        if obj.type == "EMPTY" and obj.instance_collection is not None:
+            inner = obj.instance_collection.all_objects
+            found.update(dict.fromkeys(mesh for mesh in inner if _is_plain_mesh(mesh)))
+        elif obj.type == "MESH":
+            made = level_info.is_level(obj) or level_info.is_hull(obj)
+            found[(level_info.find_source(obj) if made else None) or obj] = None
+    return list(found)
+
+
+def _is_plain_mesh(obj: bpy.types.Object) -> bool:
+    return obj.type == "MESH" and not level_info.is_level(obj) and not level_info.is_hull(obj)
+
+
+def read_sources(meshes: Iterable[bpy.types.Object], *, apply_modifiers: bool,
+                 live_types: Collection[str]) -> list[LodSource]:
+    """Read mesh objects, those that share a mesh and have the same modifiers together.
+
+    Parameters
+    ----------
+    meshes : iterable of bpy.types.Object
+    apply_modifiers : bool
+    live_types : collection of str
+        Kinds of modifiers that stay live where they can.
+
+    Returns
+    -------
+    list of LodSource
+        Without meshes that have no faces.
+
+    Raises
+    ------
+    MeshError
+        A mesh that cannot be read.
+    """
+    groups: dict[tuple[bpy.types.Mesh, str], list[bpy.types.Object]] = {}
+    for obj in meshes:
+        groups.setdefault((obj.data, modifier_settings(obj)), []).append(obj)
+    sources = []
+    for group in groups.values():
+        group.sort(key=_volume, reverse=True)
+        live = live_modifiers(group[0], live_types) if apply_modifiers else []
+        with switched_off(group[0], live):
+            arrays = read_mesh(group[0], apply_modifiers=apply_modifiers)
+        if len(arrays.triangles):
+            sources.append(LodSource(group, arrays, live))
+    return sources
+
+
+def _volume(obj: bpy.types.Object) -> float:
+    return abs(float(np.linalg.det(np.array(obj.matrix_world, np.float64)[:3, :3])))
+
+
+def write_chain(source: LodSource, chain: Chain, names: Sequence[str]) -> list[LevelMesh]:
+    """Make the meshes of a chain, the finest first, with what is told of each but for its source.
+
+    Parameters
+    ----------
+    source : LodSource
+    chain : Chain
+    names : sequence of str
+        Of the meshes.
+    """
+    written: list[LevelMesh] = []
+    before = len(source.arrays.triangles)
+    for number, (level, name) in enumerate(zip(chain.levels, names, strict=False)):
+        after = len(level.result.faces)
+        last = written[-1] if written else None
+        if last is not None and last.properties[level_info.TRIANGLES] == after:
+            mesh = last.mesh  # a budget left this mesh as it was
+        else:
+            mesh = write_mesh(level.result, source.arrays, name)
+            note_materials(mesh)
+        short = "" if level.result.reached else level.result.messages[-1]
+        told = level_info.level_properties(source.objects[0], number, before, after, level.result.error,
+                                           level.distance, short)
+        written.append(LevelMesh(mesh, told))
+    return written
+
+
+def told_of(level: LevelMesh, obj: bpy.types.Object, settings: str, profile: str) -> LevelMesh:
+    """Have a level tell which object it was made from, and how."""
+    own = {level_info.SOURCE: obj.name, level_info.MESH: obj.data.name, level_info.HASH: fingerprint(obj),
+           level_info.SETTINGS: settings, level_info.PROFILE: profile}
+    return LevelMesh(level.mesh, {**level.properties, **own})
+
+
+def name_meshes(levels: Sequence[LevelMesh], names: Sequence[str]) -> None:
+    """Give the meshes their names, when those that had them are gone."""
+    for level, name in reversed(list(zip(levels, names, strict=False))):  # the finest of several that share one
+        take_name(level.mesh, name, bpy.data.meshes)

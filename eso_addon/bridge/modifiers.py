@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Modifiers that belong after decimation: they stay live on the levels, the others go into the mesh."""
+
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
+
+import bpy
+
+_ANYWHERE = {"ARMATURE"}  # what is simplified is the mesh at rest, whatever comes before or after
+
+
+def live_modifiers(obj: bpy.types.Object, types: Collection[str]) -> list[str]:
+    """Name the modifiers that stay live.
+
+    Parameters
+    ----------
+    obj : bpy.types.Object
+    types : collection of str
+        Kinds of modifiers, such as "ARMATURE" or "MIRROR". A Mirror or Subdivision Surface stays live only if nothing
+        but such modifiers comes after it: what comes after works on its result.
+
+    Returns
+    -------
+    list of str
+    """
+    names: list[str] = []
+    is_tail = True
+    for modifier in reversed(obj.modifiers):
+        is_tail = is_tail and modifier.type in types
+        if modifier.type in types and (is_tail or modifier.type in _ANYWHERE):
+            names.append(modifier.name)
+    return names[::-1]
+
+
+@contextmanager
+def switched_off(obj: bpy.types.Object, names: Collection[str]) -> Iterator[None]:
+    """Evaluate an object without some of its modifiers."""
+    shown = [modifier for modifier in obj.modifiers if modifier.name in names and modifier.show_viewport]
+    try:
+        for modifier in shown:
+            modifier.show_viewport = False
+        yield
+    finally:
+        for modifier in shown:
+            modifier.show_viewport = True
+
+
+def keep_modifiers(obj: bpy.types.Object, names: Collection[str]) -> None:
+    """Remove all modifiers but some."""
+    for modifier in [modifier for modifier in obj.modifiers if modifier.name not in names]:
+        obj.modifiers.remove(modifier)

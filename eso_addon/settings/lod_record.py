@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How levels were made, as plain data that is stored with them and makes them again."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from ..core.chains import Goals
+from ..core.mesh import MeshError
+from ..core.options import Options, options_of
+from ..core.screen import Screen
+
+
+@dataclass(frozen=True)
+class LodSettings:
+    """How levels are made.
+
+    Attributes
+    ----------
+    kind, values
+        As of `Goals`.
+    screen
+        Fields of `Screen`.
+    engine
+        What `simplify` takes besides a target.
+    apply_modifiers
+        Whether the meshes have the modifiers in them.
+    live
+        Kinds of modifiers that stay live nevertheless.
+    profile
+        A key of `PROFILES`.
+    """
+
+    kind: str
+    values: Sequence[float]
+    screen: Mapping[str, Any]
+    engine: Mapping[str, Any]
+    apply_modifiers: bool
+    live: Sequence[str]
+    profile: str
+
+    @classmethod
+    def read(cls, data: Mapping[str, Any] | None) -> "LodSettings":
+        """Make settings from what was stored.
+
+        Raises
+        ------
+        MeshError
+            What was stored is not of this version.
+        """
+        try:
+            return cls(**(data or {}))
+        except TypeError:
+            raise MeshError("these levels do not say how they were made: generate them anew") from None
+
+    def stored(self, counts: Sequence[int]) -> dict[str, Any]:
+        """Give the settings for one mesh to be stored; of a budget, its share."""
+        data = asdict(self)
+        return data | {"kind": "count", "values": list(counts)} if self.kind == "budget" else data
+
+    def goals(self) -> Goals:
+        """Give the goals of the levels."""
+        return Goals(self.kind, list(self.values), Screen(**self.screen))
+
+    def options(self) -> Options:
+        """Give the engine's options."""
+        engine = dict(self.engine)
+        return options_of(engine.pop("preset", "default"), engine)
