@@ -14,6 +14,7 @@ from typing import Protocol
 
 import numpy as np
 
+from .alone import fails_alone
 from .blocks import Blocks
 from .manifold import boundary_fans
 from .mesh import Bools, Floats, Ints
@@ -36,6 +37,8 @@ _GATHER = pow(_SCATTER, -1, 1 << 32)
 # faces a block: its arrays stay in the second cache
 _BLOCK = 16384
 _SAMPLES = 8192
+# edges that are tried alone before a batch is chosen from them
+_FEW = 8192
 # no face may shrink to less than this part of its area: flat meshes would fill with faces without any
 _SLIVER = 1e-3
 # with fewer faces than this the share shrinks with them: small meshes are collapsed with more care
@@ -334,6 +337,8 @@ def _apply_factor(state: _State) -> None:
 
 def _choose(state: _State) -> _Batch | None:
     """Choose the edges that are the cheapest at both ends, among the cheapest part of all."""
+    if state.guide is not None:
+        _sieve(state, state.guide)
     threshold = _threshold(state)
     if threshold is None:
         return None
@@ -354,6 +359,18 @@ def _choose(state: _State) -> _Batch | None:
     keys = np.sort(np.concatenate(chosen))
     slot = ((keys & _LOW) * _GATHER) & _LOW
     return _place(state, slot, (keys >> 32).astype(np.int32).view(np.float32))
+
+
+def _sieve(state: _State, guide: Guide) -> None:
+    """Reject what fails even alone, once few edges are left: most of them do."""
+    slot = np.flatnonzero(np.isfinite(state.costs))
+    if not 0 < len(slot) <= _FEW:
+        return
+    one, other = _ends(state.faces, slot)
+    swap = guide.swaps(one, other)
+    fails = fails_alone(state.before, state.faces, state.boundary, np.where(swap, one, other),
+                        np.where(swap, other, one), lambda old, new: _turned(state, old, new))
+    state.base.ravel()[slot[fails]] = state.costs.ravel()[slot[fails]] = np.inf
 
 
 def _threshold(state: _State) -> np.float32 | None:
