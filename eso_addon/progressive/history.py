@@ -67,27 +67,37 @@ class Unwinding:
         self._goes = np.arange(len(points))
         self._chosen = np.zeros(len(points), bool)
 
-    def collapse(self, new: Ints, old: Ints) -> Batch | None:
-        """Carry out a batch of half-edge collapses, less those that are not the inverse of a clean split."""
-        able = ~(self.frozen.take(new) | self.frozen.take(old))
-        held = np.zeros(0, np.int64)
-        while True:
-            self.held[held] = True
-            self._freeze(new[~able])
-            new, old = new[able], old[able]
-            if len(new) == 0:
-                return None
-            self._label[new] = np.arange(len(new))
-            self._goes[new] = old
-            self._chosen[old] = True
-            attempt = _Attempt(self, new, old)
-            self._label[new] = -1
-            self._goes[new] = new
-            self._chosen[old] = False
+    def collapse(self, new: Ints, old: Ints) -> tuple[Batch | None, Bools]:
+        """Carry out a batch of half-edge collapses; return it, and which of them must wait for the next one.
+
+        They are given in the record's order, in which each follows from those before it. Carried out at once some are
+        not the inverse of a clean split: of those that share a face the later ones wait. One that is alone and still
+        not clean is held.
+        """
+        late = np.zeros(len(new), bool)
+        at = np.flatnonzero(~(self.frozen.take(new) | self.frozen.take(old)))
+        self._freeze(np.delete(new, at))
+        while len(at):
+            attempt = self._attempt(new.take(at), old.take(at))
             if not attempt.bad.any():
-                return attempt.accept()
-            able = ~attempt.bad
-            held = new[attempt.bad]
+                return attempt.accept(), late
+            wait = attempt.later()
+            late[at[wait]] = True
+            alone = attempt.bad & ~attempt.crowded
+            self.held[new[at[alone]]] = True
+            self._freeze(new[at[alone]])
+            at = at[~wait & ~alone]
+        return None, late
+
+    def _attempt(self, new: Ints, old: Ints) -> "_Attempt":
+        self._label[new] = np.arange(len(new))
+        self._goes[new] = old
+        self._chosen[old] = True
+        attempt = _Attempt(self, new, old)
+        self._label[new] = -1
+        self._goes[new] = new
+        self._chosen[old] = False
+        return attempt
 
     def _freeze(self, new: Ints) -> None:
         if len(new) == 0:
@@ -127,6 +137,28 @@ class _Attempt:
         self._flat_faces(dead)
         if not self.bad.any():
             self._check_openings()
+
+    def later(self) -> Bools:
+        """Find the collapses that must wait: the later ones around each that is not clean, and what follows from them."""
+        count = len(self.new)
+        own = np.full(len(self.mesh.points), -1)
+        own[self.old] = np.arange(count)
+        near = np.where(self.label >= 0, self.label, own.take(self.fine))
+        one, other = (np.concatenate(parts) for parts in zip(
+            *((near[i], self.label[j]) for i in range(3) for j in range(3) if i != j), strict=True))
+        met = (one >= 0) & (other >= 0) & (one != other)
+        one, other = one[met], other[met]
+        first, second = np.minimum(one, other), np.maximum(one, other)
+        self.crowded = np.zeros(count, bool)
+        self.crowded[one] = True
+        wait = np.zeros(count, bool)
+        # where both a collapse and an earlier one beside it are there, the later one waits
+        wait[second[self.bad.take(one)]] = True
+        while True:
+            further = second[wait.take(first) & ~wait.take(second)]
+            if len(further) == 0:
+                return wait
+            wait[further] = True
 
     def _sort_corners(self, dead: Bools, count: int) -> None:
         """Tell corners of new vertices that change vertex from those whose face falls."""

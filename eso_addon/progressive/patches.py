@@ -118,21 +118,19 @@ def make_patches(source: Source, target: int, options: dict[str, Any]) -> Genera
                 break
         removed, kept = mesh.source.take(record.removed), mesh.source.take(record.kept)
         vertices = int(np.count_nonzero(np.bincount(unwinding.faces.ravel())))
-        for chosen_now in _regrouped(removed, kept, record.batch_starts, vertices, len(points)):
-            batch = unwinding.collapse(removed[chosen_now], kept[chosen_now])
-            if batch is not None:
-                batches.append(batch)
+        batches += _regrouped(unwinding, removed, kept, record.batch_starts, vertices)
         if int(unwinding.held.sum()) == held:
             break
         unwinding.frozen[:] = False
     return _Numbering(source, unwinding, faces, batches[::-1], corner).patches()
 
 
-def _regrouped(removed: Ints, kept: Ints, starts: Ints, vertices: int, count: int) -> Generator[Ints, None, None]:
-    """Give the record's collapses in fewer and larger batches: a batch has one flag a vertex, however many split.
+def _regrouped(mesh: Unwinding, removed: Ints, kept: Ints, starts: Ints, vertices: int) -> Generator[Batch, None, None]:
+    """Carry out the record's collapses in fewer and larger batches: a batch has one flag a vertex, however many split.
 
-    Collapses without a common vertex may change places: their splits do not depend on each other.
+    Collapses without a common vertex may mostly change places: their splits do not depend on each other.
     """
+    count = len(mesh.points)
     ends = np.append(starts[1:], len(removed))[: len(starts)]
     total = vertices
     first = np.full(count, count)
@@ -149,8 +147,11 @@ def _regrouped(removed: Ints, kept: Ints, starts: Ints, vertices: int, count: in
         np.minimum.at(first, other, place)
         free = (first.take(one) == place) & (first.take(other) == place)
         first[one], first[other] = count, count
-        yield waiting[free]
-        vertices -= int(free.sum())
+        batch, late = mesh.collapse(one[free], other[free])
+        if batch is not None:
+            yield batch
+            vertices -= len(batch.new)
+        free[np.flatnonzero(free)[late]] = False
         waiting = waiting[~free]
 
 
