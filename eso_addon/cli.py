@@ -6,16 +6,19 @@ import json
 import sys
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
-from .settings.profiles import PROFILES
+from .cli_lod import add_options as add_lod_options
+from .cli_lod import finish, lod, make_chains, outcome
+from .cli_serve import add_word as add_serve
+from .settings.profiles import Profile
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from .core.chains import Chain
     from .core.deviation import Deviation
     from .core.levels import SimplifyResult
     from .progressive.progressive import Level
@@ -36,6 +39,10 @@ class Model(Protocol):
         """Name, vertices and triangles of each mesh."""
 
     @property
+    def copies(self) -> list[int]:
+        """How many objects show each part."""
+
+    @property
     def left_behind(self) -> list[str]:
         """What simplified versions lose."""
 
@@ -43,15 +50,16 @@ class Model(Protocol):
         """Write one result for each part; give the files written."""
 
     def write_levels(
-        self, path: Path, levels: "Sequence[Sequence[SimplifyResult]]", name_level: Callable[[str, int], str]
+        self, path: Path, chains: "Sequence[Chain]", profile: Profile, *, settings: str, hulls: str
     ) -> list[Path]:
-        """Write all levels, each with one result for each part; give the files written."""
+        """Write all levels of each part; give the files written."""
 
 
 class OffModel:
     """An .off file on its way to another: no Blender needed."""
 
     left_behind: list[str] = []
+    copies = [1]
 
     def __init__(self, path: Path) -> None:
         from .files.off import FileFormatError, read_off
@@ -68,26 +76,16 @@ class OffModel:
         return [path]
 
     def write_levels(
-        self, path: Path, levels: "Sequence[Sequence[SimplifyResult]]", name_level: Callable[[str, int], str]
+        self, path: Path, chains: "Sequence[Chain]", profile: Profile, *, settings: str, hulls: str
     ) -> list[Path]:
         """Write each level to a file of its own."""
-        paths = [path.with_stem(name_level(path.stem, index)) for index in range(len(levels))]
-        for level_path, results in zip(paths, levels, strict=True):
-            self.write_simplified(level_path, results)
+        if hulls != "none":
+            raise ValueError(".off files hold no collision hulls: leave out --hulls")
+        levels = chains[0].levels
+        paths = [path.with_stem(profile.name(path.stem, index)) for index in range(len(levels))]
+        for level_path, level in zip(paths, levels, strict=True):
+            self.write_simplified(level_path, [level.result])
         return paths
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """What became of one mesh at one level."""
-
-    name: str
-    level: int
-    triangles_before: int
-    triangles_after: int
-    error: float
-    reached: bool
-    messages: tuple[str, ...]
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -135,11 +133,7 @@ def _parser() -> argparse.ArgumentParser:
                          help="method feature: go on until only features are left, those whose weight is below X")
     _add_engine_words(simplify)
     lod = _add_word(words, "lod", _lod, "write several levels of detail", "IN", "OUT")
-    targets = lod.add_mutually_exclusive_group(required=True)
-    targets.add_argument("--ratios", type=_list_of(_ratio), metavar="R,R,…", help="share of triangles at each level")
-    targets.add_argument("--faces", type=_list_of(_count), metavar="N,N,…", help="triangles at each level")
-    targets.add_argument("--errors", type=_list_of(_length), metavar="E,E,…", help="largest deviation at each level")
-    lod.add_argument("--profile", choices=PROFILES, default="plain", help="the engine that names the levels")
+    add_lod_options(lod, _ratio, _count, _length)
     _add_engine_words(lod)
     _add_word(words, "measure", _measure, "say how far a mesh is from another", "ORIGINAL", "SIMPLIFIED")
     _add_stream_words(words)
@@ -165,6 +159,7 @@ def _add_stream_words(words: Any) -> None:  # noqa: ANN401 - argparse keeps the 
     info = words.add_parser("info", help="say what a stream holds", description="Say what a stream holds.")
     info.set_defaults(run=_info)
     info.add_argument("input", type=_stream_path, metavar="IN", help=f"a {ENDING} file")
+    add_serve(words, _stream_path)
 
 
 def _stream_path(word: str) -> Path:
@@ -260,51 +255,37 @@ def _number(word: str, is_valid: Callable[[float], bool], wanted: str) -> float:
     raise argparse.ArgumentTypeError(f"{word} is not {wanted}")
 
 
-def _list_of(read: Callable[[str], float]) -> Callable[[str], list[float]]:
-    return lambda words: [read(word) for word in words.split(",")]
-
-
 def _simplify(args: argparse.Namespace) -> None:
-    from .core.simplify import simplify
+    from .settings.lod_record import LodSettings
 
-    keyword, value = _target({"ratio": args.ratio, "faces_target": args.faces, "max_error": args.max_error,
-                              "epsilon": args.epsilon})
     options = _engine_options(args)
-    if keyword == "epsilon" and options.setdefault("method", "feature") != "feature":
+    if args.epsilon is not None and options.setdefault("method", "feature") != "feature":
         raise ValueError("--epsilon belongs to --method feature: leave out one of them")
-
-    def run(part: "Part", goals: Sequence[float]) -> "list[SimplifyResult]":
-        _, vertices, faces = part
-        return [simplify(vertices, faces, **{**options, keyword: goals[0]})]
-
     model = _open(args.input, args.output)
     started = time.perf_counter()
-    levels = _run_on_parts(model.parts, keyword, [value], run)
+    if args.epsilon is not None:
+        results = [_simplify_to_epsilon(part, {**options, "epsilon": args.epsilon}) for part in model.parts]
+    else:
+        kind, value = _target({"ratio": args.ratio, "budget": args.faces, "error": args.max_error})
+        chains = make_chains(model, LodSettings(kind, [value], {}, options, True, [], ""))
+        results = [chain.levels[0].result for chain in chains]
     seconds = time.perf_counter() - started
-    written = model.write_simplified(args.output, levels[0])
-    _report(args, model, levels, [args.output.stem], seconds, written)
+    written = model.write_simplified(args.output, results)
+    _report(args, model, results, seconds, written)
+
+
+def _simplify_to_epsilon(part: "Part", options: dict[str, Any]) -> "SimplifyResult":
+    from .core.simplify import simplify
+
+    name, vertices, faces = part
+    try:
+        return simplify(vertices, faces, **options)
+    except ValueError as error:
+        raise ValueError(f"{name}: {error}") from error
 
 
 def _lod(args: argparse.Namespace) -> None:
-    from .core.simplify import lod_chain
-
-    keyword, values = _target({"ratios": args.ratios, "faces_targets": args.faces, "max_errors": args.errors})
-    values = sorted(values, reverse=keyword != "max_errors")  # finest first
-    profile = PROFILES[args.profile]
-    if profile.most_levels and len(values) > profile.most_levels:
-        raise ValueError(f"{profile.label} takes at most {profile.most_levels} levels, not {len(values)}")
-    options = _engine_options(args)
-
-    def run(part: "Part", goals: Sequence[float]) -> "list[SimplifyResult]":
-        _, vertices, faces = part
-        return lod_chain(vertices, faces, **{**options, keyword: goals})
-
-    model = _open(args.input, args.output)
-    started = time.perf_counter()
-    levels = _run_on_parts(model.parts, keyword, values, run)
-    seconds = time.perf_counter() - started
-    written = model.write_levels(args.output, levels, profile.name)
-    _report(args, model, levels, [profile.name("", index) for index in range(len(levels))], seconds, written)
+    lod(args, _open, _engine_options(args))
 
 
 def _target(values: dict[str, Any]) -> tuple[str, Any]:
@@ -335,63 +316,16 @@ def _scene_files() -> Any:  # noqa: ANN401 - a module
     return scene_files
 
 
-def _run_on_parts(
-    parts: "list[Part]",
-    keyword: str,
-    goals: list[float],
-    run: "Callable[[Part, Sequence[float]], list[SimplifyResult]]",
-) -> "list[list[SimplifyResult]]":
-    """Simplify each part; give for each level a result for each part.
-
-    A count is for all parts together: each gets its share of what the smaller ones left over.
-    """
-    results: dict[int, list[SimplifyResult]] = {}
-    left = list(goals)
-    triangles_left = sum(len(faces) for _, _, faces in parts)
-    for index in sorted(range(len(parts)), key=lambda index: len(parts[index][2])):
-        size = len(parts[index][2])
-        is_count = keyword in ("faces_target", "faces_targets")
-        shares: Sequence[float] = [max(round(goal * size / triangles_left), 1) for goal in left] if is_count else goals
-        try:
-            results[index] = run(parts[index], shares)
-        except ValueError as error:
-            raise ValueError(f"{parts[index][0]}: {error}") from error
-        left = [goal - len(result.faces) for goal, result in zip(left, results[index], strict=True)]
-        triangles_left -= size
-    return [[results[index][level] for index in range(len(parts))] for level in range(len(goals))]
-
-
 def _report(
-    args: argparse.Namespace,
-    model: Model,
-    levels: "list[list[SimplifyResult]]",
-    level_names: list[str],
-    seconds: float,
-    written: list[Path],
+    args: argparse.Namespace, model: Model, results: "Sequence[SimplifyResult]", seconds: float, written: list[Path]
 ) -> None:
-    outcomes = [
-        Outcome(name, level, len(faces), len(r.faces), float(r.error), bool(r.reached), tuple(r.messages))
-        for level, results in enumerate(levels)
-        for (name, _, faces), r in zip(model.parts, results, strict=True)
-    ]
-    for outcome in outcomes:
-        label = outcome.name if len(levels) == 1 else f"{outcome.name}{level_names[outcome.level]}"
-        counts = f"{outcome.triangles_before} -> {outcome.triangles_after} triangles"
-        print(f"{label}: {counts}, error {outcome.error:.6g}" + "".join(f"; {text}" for text in outcome.messages))
-    for note in model.left_behind:
-        print(note)
-    print(f"{' '.join(map(str, written))} written, {seconds:.2f} s of work")
-    if args.json:
-        _write_json(
-            args.json,
-            {
-                "input": str(args.input),
-                "output": [str(path) for path in written],
-                "seconds": seconds,
-                "meshes": [asdict(outcome) for outcome in outcomes],
-                "not_carried_over": model.left_behind,
-            },
-        )
+    outcomes = []
+    for (name, _, faces), result in zip(model.parts, results, strict=True):
+        found = outcome(name, 0, len(faces), result)
+        outcomes.append(found)
+        counts = f"{found.triangles_before} -> {found.triangles_after} triangles"
+        print(f"{name}: {counts}, error {found.error:.6g}" + "".join(f"; {text}" for text in found.messages))
+    finish(args, model, outcomes, seconds, written)
 
 
 def _measure(args: argparse.Namespace) -> None:

@@ -18,7 +18,8 @@ BELOW = {
     "bridge": {"core", "progressive", "files"},
     "jobs": {"core"},
     "settings": {"core"},
-    "operators": {"settings", "jobs", "bridge", "files", "progressive", "core"},
+    "viewer": {"files"},
+    "operators": {"settings", "jobs", "bridge", "files", "progressive", "viewer", "core"},
     "ui": {"operators", "settings"},
 }
 BLENDER = {"bpy", "bpy_extras", "mathutils", "addon_utils"}
@@ -29,6 +30,7 @@ OUTSIDE = {
     "bridge": {"numpy", *BLENDER},
     "jobs": {*BLENDER},
     "settings": {*BLENDER},
+    "viewer": set(),
     "operators": {"numpy", *BLENDER},
     "ui": {"gpu", "gpu_extras", "blf", "bl_operators", "bl_ui", *BLENDER},
 }
