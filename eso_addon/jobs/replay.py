@@ -61,6 +61,11 @@ def replayed_steps(
     return levels, replayed
 
 
+def kept() -> Recording | None:
+    """Give the run that is kept, None if there is none."""
+    return next(iter(_kept.values()), None)
+
+
 def forget() -> None:
     """Drop the kept run."""
     _kept.clear()

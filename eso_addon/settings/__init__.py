@@ -3,14 +3,16 @@
 
 
 def register() -> None:
-    """Add the settings to scenes and the last run's figures to the session."""
-    from . import scene
+    """Add the settings to scenes, the last run's figures to the session, preferences, presets and translations."""
+    from . import preferences, preset_path, scene, translations
 
-    scene.register()
+    for part in (preferences, scene, preset_path, translations):
+        part.register()
 
 
 def unregister() -> None:
     """Take them away again."""
-    from . import scene
+    from . import preferences, preset_path, scene, translations
 
-    scene.unregister()
+    for part in (translations, preset_path, scene, preferences):
+        part.unregister()

@@ -3,14 +3,25 @@
 # mypy: disable-error-code="valid-type"
 """The panel's settings, saved with the scene, and the figures of the last run, kept for the session."""
 
+from collections.abc import Callable
+
 import bpy
 from bpy.props import BoolProperty, FloatProperty, PointerProperty, StringProperty
 
+from .level_list import LevelList
 from .lod_options import LodOptions
 from .options import SimplifyOptions
 
+# Called with the context when the level slider moves.
+on_level: list[Callable[[bpy.types.Context], None]] = []
 
-class ESO_PG_settings(SimplifyOptions, LodOptions, bpy.types.PropertyGroup):
+
+def _level_moved(_run: bpy.types.bpy_struct, context: bpy.types.Context) -> None:
+    for listener in on_level:
+        listener(context)
+
+
+class ESO_PG_settings(SimplifyOptions, LodOptions, LevelList, bpy.types.PropertyGroup):
     """What the panel offers; its names are the operators' own."""
 
     def hand_over(self, operator: bpy.types.OperatorProperties) -> None:
@@ -29,6 +40,11 @@ class ESO_PG_last_run(bpy.types.PropertyGroup):
     running: StringProperty()
     progress: FloatProperty()
     stopping: BoolProperty()
+    seconds: FloatProperty()
+    level: FloatProperty(
+        name="Level", description="Drag through all levels, from the coarsest to the mesh itself", default=1.0, min=0.0,
+        max=1.0, precision=3, subtype="FACTOR", update=_level_moved,
+    )  # fmt: skip
 
     def show(self, title: str, *lines: str) -> None:
         """Keep a report for the panel."""

@@ -1,18 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is drawn: the sidebar panel `ESO` and the entries in the Object menus."""
+"""What is drawn: the sidebar panels `ESO`, the entries in the Object menus, presets, and overlays."""
 
 
 def register() -> None:
-    """Add the panels and the menu entries."""
-    from . import menus, panels
+    """Add the panels, the menu entries and the overlays."""
+    from . import menus, overlay, panels, presets
 
-    panels.register()
-    menus.register()
+    for part in (presets, panels, menus, overlay):
+        part.register()
 
 
 def unregister() -> None:
     """Take them away again."""
-    from . import menus, panels
+    from . import menus, overlay, panels, presets
 
-    menus.unregister()
-    panels.unregister()
+    for part in (overlay, menus, panels, presets):
+        part.unregister()

@@ -3,7 +3,17 @@
 
 import bpy
 
-OPERATORS = ("object.eso_simplify", "object.eso_lod_generate", "object.eso_measure")
+OPERATORS = (
+    "object.eso_simplify",
+    "object.eso_level_slide",
+    "object.eso_lod_generate",
+    "object.eso_lod_update",
+    "object.eso_measure",
+    "object.eso_weights_show",
+    "object.eso_edges_show",
+    "object.eso_deviation_show",
+    "object.eso_overlay_hide",
+)
 
 
 class VIEW3D_MT_eso_lod(bpy.types.Menu):
