@@ -2,6 +2,15 @@
 """Root of the extension for Blender: hands over to `eso_addon`, and imports nothing until it is asked to."""
 
 
+def __getattr__(name: str) -> object:
+    """Give Blender's glTF exporter its hook, which it looks for here."""
+    if name != "glTF2ExportUserExtension":
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from .eso_addon import glTF2ExportUserExtension
+
+    return glTF2ExportUserExtension
+
+
 def register() -> None:
     """Switch the add-on on."""
     from .eso_addon import register as register_addon

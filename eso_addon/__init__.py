@@ -38,6 +38,7 @@ _MODULE_OF_NAME = {
     "Deviation": "core.deviation",
     "MeshError": "core.mesh",
     "SimplifyResult": "core.levels",
+    "glTF2ExportUserExtension": "bridge.gltf_lod",  # for Blender's glTF exporter, which looks for it here
     "lod_chain": "core.simplify",
     "lod_chain_steps": "core.simplify",
     "Progressive": "progressive.progressive",

@@ -154,7 +154,7 @@ def test_a_ratio_applies_to_each_mesh_and_a_count_to_all(group: Path, tmp_path: 
     assert run("simplify", group, tmp_path / "count.glb", "--faces", "401", "--json", figures) == 0
     counts = {mesh["name"]: mesh["triangles_after"] for mesh in json.loads(figures.read_text())["meshes"]}
     assert sum(counts.values()) in (400, 401)
-    assert counts["small"] == pytest.approx(401 * 168 / 1128, abs=2)
+    assert counts["small"] / 168 > counts["big"] / 960  # as large a sphere of fewer triangles: each matters more
 
 
 @pytest.mark.parametrize("ending", [".blend", ".fbx", ".glb", ".obj"])

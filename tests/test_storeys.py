@@ -22,7 +22,7 @@ BELOW = {
     "operators": {"settings", "jobs", "bridge", "files", "progressive", "viewer", "core"},
     "ui": {"operators", "settings"},
 }
-BLENDER = {"bpy", "bpy_extras", "mathutils", "addon_utils"}
+BLENDER = {"bmesh", "bpy", "bpy_extras", "io_scene_gltf2", "mathutils", "addon_utils"}
 OUTSIDE = {
     "core": {"numpy"},
     "progressive": {"numpy"},

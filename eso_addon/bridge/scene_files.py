@@ -3,19 +3,46 @@
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Protocol
 
 import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.chains import Chain
 from ..files.atomic import atomic_output
 from ..files.off import FileFormatError, read_off, write_off
-from .objects import add_object, replace_mesh, select_only
+from . import level_info
+from .export_levels import LevelGroup, export_levels
+from .hulls import add_hulls
+from .level_names import check_free, fitting_names
+from .lod_sources import name_meshes, read_sources, write_chain
+from .objects import add_object, level_collection, replace_mesh, select_only
+from .place_levels import LevelMesh
 from .quiet import quiet
-from .read_mesh import MeshArrays, read_mesh
+from .read_mesh import read_mesh
 from .write_mesh import Simplified, write_mesh
 
 _AXES = {"forward_axis": "Y", "up_axis": "Z"}
+_LIVE = ("ARMATURE",)  # a file's levels are posed by what poses it
+
+
+class Profile(Protocol):
+    """What an engine wants."""
+
+    @property
+    def key(self) -> str:
+        """The word for it."""
+
+    @property
+    def layout(self) -> str:
+        """How levels stand to each other."""
+
+    def name(self, base: str, level: int) -> str:
+        """Name a level, 0 being the finest."""
+
+    def hull_name(self, base: str, number: int) -> str:
+        """Name a collision hull, counted from 1."""
 
 
 class SceneFile:
@@ -28,8 +55,12 @@ class SceneFile:
 
     Attributes
     ----------
+    sources : list of LodSource
+        Each mesh once, with the objects that show it.
     parts : list of (str, (n, 3) float64, (m, 3) int64)
-        Name, vertices and triangles of each mesh, in the size that it has in the scene.
+        Name, vertices and triangles of each, in the size that it has in the scene.
+    copies : list of int
+        How many objects show each.
     left_behind : list of str
         What simplified meshes lose, for each mesh that loses anything.
 
@@ -46,14 +77,13 @@ class SceneFile:
             pass  # says why a file cannot be opened better than Blender does
         with quiet(f"cannot read {path.name}"):
             READERS[path.suffix.lower()](path)
-            meshes = [(obj, read_mesh(obj)) for obj in _visible_meshes()]
-        self.objects: list[bpy.types.Object] = [obj for obj, mesh in meshes if len(mesh.triangles)]
-        self.meshes: list[MeshArrays] = [mesh for _, mesh in meshes if len(mesh.triangles)]
-        if not self.objects:
+            self.sources = read_sources(_visible_meshes(), apply_modifiers=True, live_types=_LIVE)
+        if not self.sources:
             raise FileFormatError(f"{path.name} has no visible mesh with faces: nothing to work on")
-        pairs = list(zip(self.objects, self.meshes, strict=True))
-        self.parts = [(obj.name, mesh.vertices, mesh.triangles) for obj, mesh in pairs]
-        losses = [(obj.name, ", ".join(mesh.left_behind)) for obj, mesh in pairs if mesh.left_behind]
+        self.objects = [obj for source in self.sources for obj in source.objects]
+        self.copies = [len(source.objects) for source in self.sources]
+        self.parts = [(s.objects[0].name, s.arrays.vertices, s.arrays.triangles) for s in self.sources]
+        losses = [(s.objects[0].name, ", ".join(s.arrays.left_behind)) for s in self.sources if s.arrays.left_behind]
         self.left_behind = [f"{name}: not carried over: {names}" for name, names in losses]
 
     def write_simplified(self, path: Path, results: Sequence[Simplified]) -> list[Path]:
@@ -72,14 +102,15 @@ class SceneFile:
             The file written.
         """
         with quiet(f"cannot write {path.name}"):
-            for obj, mesh, result in zip(self.objects, self.meshes, results, strict=True):
-                replace_mesh(obj, write_mesh(result, mesh, obj.data.name), modifiers_applied=True)
+            for source, result in zip(self.sources, results, strict=True):
+                mesh = write_mesh(result, source.arrays, source.objects[0].data.name)
+                for obj in source.objects:
+                    replace_mesh(obj, mesh, modifiers_applied=True, live=source.live)
             write_scene(path, self.objects)
         return [path]
 
-    def write_levels(
-        self, path: Path, levels: Sequence[Sequence[Simplified]], name_level: Callable[[str, int], str]
-    ) -> list[Path]:
+    def write_levels(self, path: Path, chains: Sequence[Chain], profile: Profile, *,
+                     settings: str = "", hulls: str = "none") -> list[Path]:
         """Write every level as an object of its own, in the place of the meshes.
 
         Parameters
@@ -87,54 +118,81 @@ class SceneFile:
         path
             A file whose ending is in `WRITERS`. Where the format holds no names of objects, each level gets a file
             of its own, named in the same way.
-        levels
-            For each level one result for each of `parts`.
-        name_level
-            Gives the name of a level from the name of its mesh and the level's index.
+        chains
+            One for each of `parts`.
+        profile
+            Names the levels and says how they stand to each other.
+        settings
+            What the levels store about how they were made.
+        hulls
+            "none", "one" for each object, or "parts": one for each of its parts.
 
         Returns
         -------
         list of Path
             The files written.
+
+        Raises
+        ------
+        MeshError
+            Two levels would have the same name.
         """
-        paths = [path]
         with quiet(f"cannot write {path.name}"):
-            objects = self._add_levels(levels, name_level)
+            groups = self._add_levels(chains, profile, settings, hulls)
             if path.suffix.lower() in NAMELESS:
-                paths = [path.with_stem(name_level(path.stem, index)) for index in range(len(levels))]
-                for level_path, level in zip(paths, objects, strict=True):
-                    write_scene(level_path, level)
+                return _write_each_level(path, groups, profile)
+            if path.suffix.lower() == ".blend":
+                write_scene(path, [obj for group in groups for obj in [*group.levels, *group.hulls]])
             else:
-                write_scene(path, [obj for level in objects for obj in level])
-        return paths
+                export_levels(path, groups, profile.layout, WRITERS[path.suffix.lower()])
+        return [path]
 
-    def _add_levels(
-        self, levels: Sequence[Sequence[Simplified]], name_level: Callable[[str, int], str]
-    ) -> list[list[bpy.types.Object]]:
+    def _add_levels(self, chains: Sequence[Chain], profile: Profile, settings: str, hulls: str) -> list[LevelGroup]:
         """Put objects for all levels in the place of the sources."""
-        names = self._set_sources_aside()
-        collections = [bpy.context.scene.collection]
-        objects: list[list[bpy.types.Object]] = []
-        for index, results in enumerate(levels):
-            objects.append([])
-            for name, source, mesh, result in zip(names, self.objects, self.meshes, results, strict=True):
-                data = write_mesh(result, mesh, name_level(name, index))
-                properties = {"eso_level": index}
-                level = add_object(source, data, data.name, collections, modifiers_applied=True, properties=properties)
-                if level.parent in self.objects:  # which goes with the other sources
-                    level.parent, level.matrix_world = None, source.matrix_world
-                objects[-1].append(level)
-        for source in self.objects:
-            bpy.data.objects.remove(source)
-        return objects
-
-    def _set_sources_aside(self) -> list[str]:
-        """Give the sources' names, and free them for levels."""
-        names = [obj.name for obj in self.objects]
+        bases = {obj: obj.name for obj in self.objects}
+        most = max(len(chain.levels) for chain in chains)
+        names = {obj: fitting_names(base, most, profile.name) for obj, base in bases.items()}
+        check_free([name for every in names.values() for name in every], self.objects)
+        for number, obj in enumerate(self.objects):
+            obj.name = f"eso_lod source {number}"
+        for source in self.sources:
+            source.objects[0].data.name = "eso_lod source"
+        made: dict[bpy.types.Object, LevelGroup] = {}
+        for source, chain in zip(self.sources, chains, strict=True):
+            levels = write_chain(source, chain, names[source.objects[0]])
+            for obj in source.objects:
+                levels_of_one = self._add_objects(obj, levels, names[obj], bases[obj], source.live)
+                for level in levels_of_one:
+                    level[level_info.SETTINGS], level[level_info.PROFILE] = settings, profile.key
+                added = add_hulls(obj, levels_of_one[0], bases[obj], profile.hull_name, hulls)
+                made[obj] = LevelGroup(bases[obj], {level: level.name for level in levels_of_one},
+                                       {hull: hull.name for hull in added})
+            name_meshes(levels, names[source.objects[0]])
         for obj in self.objects:
-            obj.name = f"{obj.name}.source"
-            obj.data.name = obj.name
-        return names
+            bpy.data.objects.remove(obj)
+        return list(made.values())
+
+    def _add_objects(self, obj: bpy.types.Object, levels: Sequence[LevelMesh], names: Sequence[str], base: str,
+                     live: Sequence[str]) -> list[bpy.types.Object]:
+        collection = level_collection(fitting_names(base, 1, lambda base, _: f"{base}_LODs")[0], bpy.context.scene)
+        made = []
+        for level, name in zip(levels, names, strict=False):
+            properties = {**level.properties, level_info.SOURCE: base}
+            new = add_object(obj, level.mesh, name, [collection], modifiers_applied=True, live=live,
+                             properties=properties)
+            if new.parent in self.objects:  # which goes with the other sources
+                new.parent, new.matrix_world = None, obj.matrix_world
+            made.append(new)
+        return made
+
+
+def _write_each_level(path: Path, groups: Sequence[LevelGroup], profile: Profile) -> list[Path]:
+    """Write a file for each level, of all objects; those with fewer levels are there with their last."""
+    most = max(len(group.levels) for group in groups)
+    paths = [path.with_stem(profile.name(path.stem, number)) for number in range(most)]
+    for number, level_path in enumerate(paths):
+        write_scene(level_path, [list(group.levels)[min(number, len(group.levels) - 1)] for group in groups])
+    return paths
 
 
 def world_triangles(path: Path) -> tuple[NDArray[np.float64], NDArray[np.int64]]:

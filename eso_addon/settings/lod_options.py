@@ -7,7 +7,7 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
 from ..core.mesh import MeshError
-from .lod_record import LodSettings
+from .lod_record import LodSettings, ordered_goals
 from .options import EngineOptions
 from .profiles import PROFILES
 
@@ -86,10 +86,11 @@ class LodOptions(EngineOptions):
         default=False,
     )
 
-    def draw_levels(self, layout: bpy.types.UILayout) -> None:
-        """Draw the levels' kind, their list, and where they go."""
+    def draw_levels(self, layout: bpy.types.UILayout, *, as_text: bool = True) -> None:
+        """Draw the levels' kind, their list unless it is drawn as rows, and where they go."""
         layout.prop(self, "levels_by")
-        layout.prop(self, _LIST_OF[self.levels_by])
+        if as_text:
+            layout.prop(self, _LIST_OF[self.levels_by])
         if self.levels_by == "screen":
             for name in ("pixel_error", "resolution", "lens"):
                 layout.prop(self, name)
@@ -132,21 +133,6 @@ class LodOptions(EngineOptions):
             live=[name for name, is_live in live.items() if is_live],
             profile=self.profile,
         )
-
-
-def ordered_goals(kind: str, goals: list[float]) -> list[float]:
-    """Put levels in order, the finest first.
-
-    Raises
-    ------
-    MeshError
-        Two levels are the same.
-    """
-    ordered = sorted(goals, reverse=kind != "error")
-    for finer, coarser in zip(ordered, ordered[1:], strict=False):
-        if finer == coarser:
-            raise MeshError(f"level {finer:g} is there twice: each level must be coarser than the one before")
-    return ordered
 
 
 def _numbers(text: str, *, whole: bool = False) -> list[float]:

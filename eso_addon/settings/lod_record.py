@@ -66,3 +66,18 @@ class LodSettings:
         """Give the engine's options."""
         engine = dict(self.engine)
         return options_of(engine.pop("preset", "default"), engine)
+
+
+def ordered_goals(kind: str, goals: list[float]) -> list[float]:
+    """Put levels in order, the finest first.
+
+    Raises
+    ------
+    MeshError
+        Two levels are the same.
+    """
+    ordered = sorted(goals, reverse=kind != "error")
+    for finer, coarser in zip(ordered, ordered[1:], strict=False):
+        if finer == coarser:
+            raise MeshError(f"level {finer:g} is there twice: each level must be coarser than the one before")
+    return ordered

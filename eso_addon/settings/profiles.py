@@ -10,6 +10,8 @@ class Profile:
 
     Attributes
     ----------
+    key
+        The word for it on the command line.
     label
         For people.
     suffixes
@@ -30,6 +32,7 @@ class Profile:
         Whether coarser levels may have a normal map baked from the finest.
     """
 
+    key: str
     label: str
     suffixes: tuple[str, ...] = ()
     stand_in: str = ""
@@ -60,14 +63,15 @@ class Profile:
         return f"{self.label} takes at most {self.most_levels} levels, not {levels}: leave some out"
 
 
-PROFILES = {
-    "plain": Profile("Plain", ending=".blend"),
-    "unity": Profile("Unity", most_levels=8, ending=".fbx"),
-    "unreal": Profile("Unreal Engine", most_levels=8, ending=".fbx", layout="lod_group",
-                      hull="UCX_{finest}_{number:02}"),
-    "godot": Profile("Godot", hull="{base}_Hull_{number:02}-convcolonly"),
-    "gltf": Profile("glTF (MSFT_lod)", layout="msft_lod"),
+_ALL = (
+    Profile("plain", "Plain", ending=".blend"),
+    Profile("unity", "Unity", most_levels=8, ending=".fbx"),
+    Profile("unreal", "Unreal Engine", most_levels=8, ending=".fbx", layout="lod_group",
+            hull="UCX_{finest}_{number:02}"),
+    Profile("godot", "Godot", hull="{base}_Hull_{number:02}-convcolonly"),
+    Profile("gltf", "glTF (MSFT_lod)", layout="msft_lod"),
     # Second Life counts from the coarsest, and its finest has no suffix.
-    "secondlife": Profile("Second Life", suffixes=("", "_LOD2", "_LOD1", "_LOD0"), stand_in="_LOD3", most_levels=4,
-                          hull="{base}_PHYS", normal_maps=False),
-}
+    Profile("secondlife", "Second Life", suffixes=("", "_LOD2", "_LOD1", "_LOD0"), stand_in="_LOD3", most_levels=4,
+            hull="{base}_PHYS", normal_maps=False),
+)
+PROFILES = {profile.key: profile for profile in _ALL}
