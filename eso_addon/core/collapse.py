@@ -36,7 +36,7 @@ _SCATTER = 0x9E3779B1
 _GATHER = pow(_SCATTER, -1, 1 << 32)
 # faces a block: its arrays stay in the second cache
 _BLOCK = 16384
-_SAMPLES = 8192
+_SAMPLES = 4096
 # edges that are tried alone before a batch is chosen from them
 _FEW = 8192
 # no face may shrink to less than this part of its area: flat meshes would fill with faces without any
@@ -214,6 +214,7 @@ def collapse_steps(points: Floats, faces: Ints, quadrics: Floats, boundary: Bool
     faces : ndarray, (3, m) int64
         Corners, in rows.
     quadrics : ndarray, (n, 12) float64
+        Changed: those of the survivors at the end.
     boundary : ndarray, (n,) bool
         Vertices with a boundary edge.
     locked : ndarray, (n,) bool, or None
@@ -241,7 +242,7 @@ def collapse_steps(points: Floats, faces: Ints, quadrics: Floats, boundary: Bool
     fans = boundary_fans(faces, np.append(boundary, False))
     if (fans > 1).any():  # boundaries meet there: such vertices stay where they are
         locked = (fans[:-1] > 1) if locked is None else locked | (fans[:-1] > 1)
-    state = _State(rules, blocks, rows, quadrics.copy(), faces.copy(), np.append(boundary, False), fans, locked,
+    state = _State(rules, blocks, rows, quadrics, faces.copy(), np.append(boundary, False), fans, locked,
                    faces.shape[1], guide, lines)
     if guide is not None and locked is not None:
         guide.hold(locked)
@@ -484,7 +485,7 @@ def _test(state: _State, batch: _Batch) -> None:
     for _, _, flipped, _ in tested:
         rejected[flipped] = True
     if state.rules.guard:
-        rejected |= _broken(state, batch, [links for _, _, _, links in tested])
+        rejected |= _broken(state, batch, [links for _, _, _, links in tested], np.arange(count))
     bound = state.guide or state.lines
     if bound is not None:
         rejected[bound.clashes(state.survivor, state.label)] = True
@@ -498,18 +499,23 @@ def _touched(state: _State, part: slice) -> _Touched:
     corner = state.faces[:, part]
     labels = [state.label.take(row) for row in corner]
     face = np.flatnonzero(np.maximum(np.maximum(labels[0], labels[1]), labels[2]) >= 0)
-    label = np.stack([row.take(face) for row in labels])
+    touched = np.empty((2, 3, len(face)), np.int64)
+    for side in range(3):
+        corner[side].take(face, out=touched[0, side], mode="clip")  # buffered where it may raise
+        labels[side].take(face, out=touched[1, side], mode="clip")
+    label = touched[1]
     gone = _removers(label)
     collapses = (label >= 0).view(np.int8)
     mixed = np.flatnonzero(collapses[0] + collapses[1] + collapses[2] - (gone != _NONE) > 1)
-    return _Touched(face + part.start, np.stack([row.take(face) for row in corner]), label, gone, mixed)
+    return _Touched(face + part.start, touched[0], label, gone, mixed)
 
 
 def _removers(label: Ints) -> Ints:
     """Return the collapse that has two corners of each face, else none."""
     first, second, third = label
-    by_first = (first == second) | (first == third)
-    return np.where(by_first, first, np.where(second == third, second, _NONE))
+    by_first, by_second = (first == second) | (first == third), second == third
+    # sums of products: a choice by a mask costs three times as much
+    return _NONE - (_NONE - first) * by_first - (_NONE - second) * (by_second & ~by_first)
 
 
 def _flips(state: _State, touched: _Touched) -> Ints:
@@ -519,10 +525,11 @@ def _flips(state: _State, touched: _Touched) -> Ints:
     flipped = np.flatnonzero(_turned(state, old, _normals(state.after, corner)) & (touched.gone == _NONE))
     found = [label.take(flipped, axis=1).max(axis=0, initial=-1)]
     # faces of several collapses pass through states in between
-    last = label.take(touched.mixed, axis=1).max(axis=0, initial=-1)
+    own_labels = label.take(touched.mixed, axis=1)
+    last = np.minimum(own_labels.max(axis=0, initial=-1), touched.gone.take(touched.mixed)).view(np.uint64)
     for side in range(3):
-        own = label[side].take(touched.mixed)
-        between = np.flatnonzero((own >= 0) & (own < last) & (own < touched.gone.take(touched.mixed)))
+        own = own_labels[side]
+        between = np.flatnonzero(own.view(np.uint64) < last)
         face, own = touched.mixed.take(between), own.take(between)
         moved = label.take(face, axis=1).view(np.uint64) <= own.view(np.uint64)
         new = _normals(state.rows, corner.take(face, axis=1) + moved * len(state.points))
@@ -551,7 +558,7 @@ def _links(state: _State, batch: _Batch, touched: _Touched, among: Bools | None 
     pairs, ends = [], []
     for side in range(3):
         own = touched.label[side]
-        turn = (own >= 0) & (own < touched.gone)
+        turn = own.view(np.uint64) < touched.gone.view(np.uint64)
         if among is not None:
             turn &= among.take(own + 1, mode="clip")
         chosen = np.flatnonzero(turn)
@@ -571,32 +578,55 @@ def _links(state: _State, batch: _Batch, touched: _Touched, among: Bools | None 
 def _at_turn(state: _State, touched: _Touched, side: int, chosen: Ints, own: Ints) -> Ints:
     """Return the corners of the chosen faces at one side, as the collapses before their own leave them."""
     corner = touched.corner[side].take(chosen)
-    before = touched.label[side].take(chosen).view(np.uint64) < own.view(np.uint64)
-    return np.where(before, state.survivor.take(corner), corner)
+    before = np.flatnonzero(touched.label[side].take(chosen).view(np.uint64) < own.view(np.uint64))
+    corner[before] = state.survivor.take(corner.take(before))
+    return corner
 
 
-def _broken(state: _State, batch: _Batch, links: list[_Links]) -> Bools:
-    """Tell the collapses that break the link condition: around the merged vertex each ring vertex must come once."""
-    own, following, open_own, preceding = (np.concatenate(rows) for rows in zip(*links, strict=True))
-    count = len(batch.one)
-    faces_left = np.bincount(own, minlength=count)
-    both = state.boundary.take(batch.one) & state.boundary.take(batch.other)
-    broken = (faces_left < np.where(batch.at_boundary, 1, 3)) | ((batch.falling > 1) & both)
-    # two writers of one place are rare: only they are sorted
-    place = following * 4 + (own & 3)
-    numbers = np.arange(len(place))
-    state.owner[place] = numbers
-    lost = np.flatnonzero(state.owner.take(place) != numbers)
+def _broken(state: _State, batch: _Batch, links: list[_Links], which: Ints) -> Bools:
+    """Tell which of these collapses break the link condition: around the merged vertex a ring vertex must come once."""
+    count = len(which)
+    number = np.zeros(len(batch.one), np.int64)
+    number[which] = np.arange(count)
+    one, other, falling = batch.one.take(which), batch.other.take(which), batch.falling.take(which)
+    at_boundary = batch.at_boundary.take(which)
+    faces_left = np.bincount(number.take(np.concatenate([own for own, _, _, _ in links])), minlength=count)
+    both = state.boundary.take(one) & state.boundary.take(other)
+    broken = (faces_left < np.where(at_boundary, 1, 3)) | ((falling > 1) & both)
+    broken[number.take(_rivals(state, links))] = True
+    if state.open:
+        # open fans must stay open and apart: the last vertex of each is none of the others
+        rings = [keys for own, following, open_own, preceding in links for keys in (
+            ((own << 32) | following).compress(batch.at_boundary.take(own)), (open_own << 32) | preceding)]
+        distinct = np.bincount(number.take(np.unique(np.concatenate(rings)) >> 32), minlength=count)
+        fans = state.fans.take(one) + state.fans.take(other) - (falling == 1)
+        broken |= at_boundary & (distinct != faces_left + fans)
+    return broken
+
+
+def _rivals(state: _State, links: list[_Links]) -> Ints:
+    """Return the collapses with a ring vertex that comes twice: two writers of one place are rare, and looked at."""
     suspect = np.zeros(len(state.owner), bool)
-    suspect[place.take(lost)] = True
-    rivals = np.flatnonzero(suspect.take(place))
-    broken[_repeated((own.take(rivals) << 32) | following.take(rivals)) >> 32] = True
-    # open fans must stay open and apart: the last vertex of each is none of the others
-    opened = np.flatnonzero(batch.at_boundary.take(own))
-    ring = np.concatenate(((own.take(opened) << 32) | following.take(opened), (open_own << 32) | preceding))
-    distinct = np.bincount(np.unique(ring) >> 32, minlength=count)
-    fans = state.fans.take(batch.one) + state.fans.take(batch.other) - (batch.falling == 1)
-    return broken | (batch.at_boundary & (distinct != faces_left + fans))
+
+    def places(block: int) -> tuple[Ints, Ints]:
+        own, following, _, _ = links[block]
+        return following * 4 + (own & 3), np.arange(len(own)) * len(links) + block
+
+    def claim(block: slice) -> None:
+        place, numbers = places(block.start)
+        state.owner[place] = numbers
+
+    def doubt(block: slice) -> None:
+        place, numbers = places(block.start)
+        suspect[place.compress(state.owner.take(place) != numbers)] = True
+
+    def collect(block: slice) -> Ints:
+        own, following, _, _ = links[block.start]
+        return ((own << 32) | following).compress(suspect.take(places(block.start)[0]))
+
+    state.blocks.map(claim, len(links), 1)
+    state.blocks.map(doubt, len(links), 1)
+    return _repeated(np.concatenate(state.blocks.map(collect, len(links), 1))) >> 32
 
 
 def _repeated(keys: Ints) -> Ints:
@@ -617,22 +647,27 @@ def _reject(state: _State, batch: _Batch, rejected: Bools) -> Bools:
     """Take collapses out of the batch; return those that fail without them."""
     _withdraw(state, batch, rejected)
     outcast = np.append(False, rejected)
-    failed = np.zeros(len(rejected), bool)
-    beside = np.zeros(len(rejected) + 1, bool)
-    for touched in batch.touched:
-        hit = outcast.take(touched.label.take(touched.mixed, axis=1) + 1, mode="clip").any(axis=0)
-        face = touched.mixed.compress(hit)
+
+    def renew(block: slice) -> _Touched:
+        touched = batch.touched[block.start]
+        face = touched.mixed.take(_among(outcast, [row.take(touched.mixed) for row in touched.label]))
         batch.unsure[_after_another(touched.label.take(face, axis=1), outcast)] = True
         label = state.label.take(touched.corner.take(face, axis=1))
         touched.label[:, face] = label
         touched.gone[face] = _removers(label)
-        left = face.take(np.flatnonzero((label >= 0).any(axis=0)))
-        failed[_flips(state, touched.take(left))] = True
-        beside[label[label >= 0] + 1] = True
-    if state.rules.guard and beside.any():
-        again = state.blocks.map(lambda block: _links(state, batch, batch.touched[block.start], beside),
-                                 len(batch.touched), 1)
-        failed |= _broken(state, batch, again) & beside[1:]
+        return touched.take(face.take(np.flatnonzero((label >= 0).any(axis=0))))
+
+    renewed = _joined(state.blocks.map(renew, len(batch.touched), 1))
+    failed = np.zeros(len(rejected), bool)
+    failed[_flips(state, renewed)] = True
+    beside = np.zeros(len(rejected) + 1, bool)
+    beside[renewed.label[renewed.label >= 0] + 1] = True
+    again = np.flatnonzero(beside[1:])
+    if state.rules.guard and len(again):
+        stars = state.blocks.map(lambda block: batch.touched[block.start].take(
+            _among(beside, batch.touched[block.start].label)), len(batch.touched), 1)
+        links = _links(state, batch, _joined(stars), beside)
+        failed[again.compress(_broken(state, batch, [links], again))] = True
     return failed & ~batch.bad
 
 
@@ -640,6 +675,19 @@ def _after_another(label: Ints, outcast: Bools) -> Ints:
     """Return the outcasts that were tested after another outcast at the same face."""
     out = np.where(outcast.take(label + 1, mode="clip"), label, _NONE)
     return out[(out > out.min(axis=0)) & (out < _NONE)]
+
+
+def _among(some: Bools, label: Ints | list[Ints]) -> Ints:
+    """Return the faces with a corner in some of the collapses, (c + 1,) bool after a False."""
+    one, two, three = (some.take(row + 1, mode="clip") for row in label)
+    return np.flatnonzero(one | two | three)
+
+
+def _joined(parts: list[_Touched]) -> _Touched:
+    gone = np.concatenate([part.gone for part in parts])
+    return _Touched(np.concatenate([part.face for part in parts]),
+                    np.concatenate([part.corner for part in parts], axis=1),
+                    np.concatenate([part.label for part in parts], axis=1), gone, np.arange(len(gone)))
 
 
 def _collapse(state: _State, batch: _Batch, target: int) -> tuple | None:

@@ -43,9 +43,7 @@ def boundary_sides(faces: Ints, opened: Bools) -> Ints:
     opened : ndarray, (n,) bool
         From `open_vertices`; only sides between two such vertices are looked at.
     """
-    start, end = faces.ravel(), np.roll(faces, -1, axis=0).ravel()
-    slots = np.flatnonzero(opened.take(start) & opened.take(end))
-    start, end = start.take(slots), end.take(slots)
+    slots, start, end = _open_sides(faces, opened)
     keys = np.minimum(start, end) * len(opened) + np.maximum(start, end)
     order = np.argsort(keys, kind="stable")
     keys = keys.take(order)
@@ -56,13 +54,25 @@ def boundary_sides(faces: Ints, opened: Bools) -> Ints:
     return slots.take(np.sort(order[alone]))
 
 
+def _open_sides(faces: Ints, opened: Bools) -> tuple[Ints, Ints, Ints]:
+    """Return the sides between two open vertices, as slots, and where they start and end."""
+    if not opened.any():
+        return (np.zeros(0, np.int64),) * 3
+    width = faces.shape[1]
+    at = [opened.take(row) for row in faces]
+    slots = np.concatenate([np.flatnonzero(at[side] & at[(side + 1) % 3]) + side * width for side in range(3)])
+    corners = faces.ravel()
+    return slots, corners.take(slots), corners.take((slots + width) % max(len(corners), 1))
+
+
 def boundary_fans(faces: Ints, opened: Bools) -> Ints:
     """Return how many runs of faces around each vertex go from boundary to boundary, (n,) int64; manifold: 0 or 1.
 
     Arguments as of `boundary_sides`.
     """
     sides = boundary_sides(faces, opened)
-    ends = np.concatenate((faces.ravel().take(sides), np.roll(faces, -1, axis=0).ravel().take(sides)))
+    corners, following = faces.ravel(), (sides + faces.shape[1]) % max(faces.size, 1)
+    ends = np.concatenate((corners.take(sides), corners.take(following)))
     return np.bincount(ends, minlength=len(opened)) // 2
 
 
@@ -129,11 +139,9 @@ def _two_colours(count: int, one: Ints, other: Ints, differ: NDArray[np.int8]) -
 
 def winding_conflicts(faces: Ints, opened: Bools) -> bool:
     """Tell whether two faces alone at an edge run along it the same way; arguments as of `boundary_sides`."""
-    start, end = faces.ravel(), np.roll(faces, -1, axis=0).ravel()
-    slots = np.flatnonzero(opened.take(start) & opened.take(end))
+    slots, start, end = _open_sides(faces, opened)
     if len(slots) == 0:
         return False
-    start, end = start.take(slots), end.take(slots)
     keys = np.sort(((np.minimum(start, end) * len(opened) + np.maximum(start, end)) << 1) | (start < end))
     edges = keys >> 1
     pair = (edges[1:] == edges[:-1]) & (keys[1:] == keys[:-1])

@@ -7,7 +7,7 @@ import numpy as np
 
 from .adjacency import vertex_components
 from .manifold import boundary_sides, open_vertices, orient, winding_conflicts
-from .mesh import Bools, Floats, Ints, MeshError, hashes, morton_order, morton_weld
+from .mesh import Bools, Floats, Ints, MeshError, bounds, hashes, morton_order, morton_weld
 
 
 @dataclass(frozen=True)
@@ -100,7 +100,7 @@ def prepare(vertices: Floats, faces: Ints, *, join: bool = True, prune: float = 
         opened = open_vertices(corners, len(source))
     boundary = boundary_sides(corners, opened)
     placed = vertices.take(source, axis=0)
-    low, high = placed.min(axis=0), placed.max(axis=0)
+    low, high = bounds(placed)
     with np.errstate(over="ignore"):
         extent = float((high - low).max())
         center = low + (high - low) / 2

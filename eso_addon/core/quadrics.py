@@ -41,21 +41,27 @@ def plane_quadrics(points: Floats, faces: Ints, *, area_weighted: bool) -> Float
     normals, areas = area_normals(points, faces)
     scale = np.where(areas > 0, (areas if area_weighted else 1.0) / np.maximum(areas * areas, 1e-300), 0.0)
     parts = np.empty((6, points.shape[1]))
+    scaled = normals * scale
     for part, (i, j) in zip(parts, _PAIRS, strict=True):
-        product = normals[i] * normals[j]
-        product *= scale
+        product = normals[i] * scaled[j]
         part[:] = sum(np.bincount(corner, product, points.shape[1]) for corner in faces)
     return parts
 
 
 def area_normals(points: Floats, faces: Ints) -> tuple[Floats, Floats]:
     """Return (3, m) face normals of the length of the area, and the (m,) areas; points are (3, n), faces (3, m)."""
-    base = [axis.take(faces[0]) for axis in points]
-    one = [axis.take(faces[1]) - start for axis, start in zip(points, base, strict=True)]
-    two = [axis.take(faces[2]) - start for axis, start in zip(points, base, strict=True)]
-    normals = np.array(cross(one, two))
-    normals *= 0.5
-    return normals, np.sqrt((normals * normals).sum(axis=0))
+    rows = np.zeros((points.shape[1], 4))
+    rows[:, :3] = points.T
+    normals, areas = np.empty(faces.shape), np.empty(faces.shape[1])
+    for start in range(0, faces.shape[1], _BLOCK):
+        part = slice(start, start + _BLOCK)
+        first = rows.take(faces[0, part], axis=0)
+        one, two = (rows.take(corner[part], axis=0) - first for corner in faces[1:])
+        for row, axis in zip(normals, cross(one.T, two.T), strict=True):
+            np.multiply(axis, 0.5, out=row[part])
+        x, y, z = normals[:, part]
+        areas[part] = np.sqrt(x * x + y * y + z * z)
+    return normals, areas
 
 
 def cross(a: Components, b: Components) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
