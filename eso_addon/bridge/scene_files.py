@@ -330,8 +330,21 @@ def _write_off(path: Path) -> None:
     write_off(path, *_joined(bpy.context.selected_objects))
 
 
+def _export_gltf(kind: str) -> Callable[[Path], None]:
+    """Make a writer of glTF; it applies modifiers that stayed live, at the cost of shape keys."""
+
+    def write(path: Path) -> None:
+        live = {modifier.type for obj in bpy.context.selected_objects for modifier in obj.modifiers} - {"ARMATURE"}
+        _export_with("export_scene.gltf", use_selection=True, use_active_scene=True, export_format=kind,
+                     export_apply=bool(live))(path)
+
+    return write
+
+
 # Textures are named by absolute paths, since the exporters write in another folder than the file will stand in.
 _IN_PLACE = {"path_mode": "ABSOLUTE"}
+# Engines want textures in the file, smoothing told, and no bones that nobody made.
+_IN_FBX = {"path_mode": "COPY", "embed_textures": True, "mesh_smooth_type": "FACE", "add_leaf_bones": False}
 
 READERS: dict[str, Callable[[Path], None]] = {
     ".blend": _read_blend,
@@ -345,9 +358,9 @@ READERS: dict[str, Callable[[Path], None]] = {
 }
 WRITERS: dict[str, Callable[[Path], None]] = {
     ".blend": _write_blend,
-    ".fbx": _export_with("export_scene.fbx", use_selection=True, axis_forward="Y", axis_up="Z", **_IN_PLACE),
-    ".glb": _export_with("export_scene.gltf", use_selection=True, export_format="GLB"),
-    ".gltf": _export_with("export_scene.gltf", use_selection=True, export_format="GLTF_SEPARATE"),
+    ".fbx": _export_with("export_scene.fbx", use_selection=True, axis_forward="Y", axis_up="Z", **_IN_FBX),
+    ".glb": _export_gltf("GLB"),
+    ".gltf": _export_gltf("GLTF_SEPARATE"),
     ".obj": _export_with("wm.obj_export", export_selected_objects=True, **_AXES, **_IN_PLACE),
     ".off": _write_off,
     ".ply": _export_with("wm.ply_export", export_selected_objects=True, **_AXES),

@@ -8,12 +8,14 @@ import bpy
 
 
 @contextmanager
-def staged(names: Mapping[bpy.types.Object, str], parents: Mapping[bpy.types.Object, bpy.types.Object | None]
-           ) -> Iterator[list[bpy.types.Object]]:
+def staged(title: str, names: Mapping[bpy.types.Object, str],
+           parents: Mapping[bpy.types.Object, bpy.types.Object | None]) -> Iterator[list[bpy.types.Object]]:
     """Show only some objects to an exporter.
 
     Parameters
     ----------
+    title : str
+        Of the scene.
     names : mapping
         The objects, in order, and their names in the file.
     parents : mapping
@@ -29,7 +31,7 @@ def staged(names: Mapping[bpy.types.Object, str], parents: Mapping[bpy.types.Obj
             stack.enter_context(_parented(obj, parent))
         everything = list(dict.fromkeys([*_needed_by(names), *names]))
         stack.enter_context(_named(names))
-        scene = stack.enter_context(_scene_of(everything))
+        scene = stack.enter_context(_scene_of(title, everything))
         layer = scene.view_layers[0]
         for obj in everything:
             stack.enter_context(_shown(obj))
@@ -93,10 +95,10 @@ def _named(names: Mapping[bpy.types.Object, str]) -> Iterator[None]:
 
 
 @contextmanager
-def _scene_of(objects: Sequence[bpy.types.Object]) -> Iterator[bpy.types.Scene]:
+def _scene_of(title: str, objects: Sequence[bpy.types.Object]) -> Iterator[bpy.types.Scene]:
     """Show a scene of these objects in the window, with the time and the units of the one before."""
     before, window = bpy.context.scene, bpy.context.window
-    scene = bpy.data.scenes.new("eso_lod stage")
+    scene = bpy.data.scenes.new(title)
     for name in ("frame_start", "frame_end", "frame_current"):
         setattr(scene, name, getattr(before, name))
     scene.render.fps, scene.render.fps_base = before.render.fps, before.render.fps_base
