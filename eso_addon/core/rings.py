@@ -23,7 +23,7 @@ Bits = NDArray[np.uint64]
 
 # Vertices a frame, a multiple of 64, and frames a block: one's rows, and one's pairs, should fit the second cache.
 FRAME = 512
-FRAMES = 8
+FRAMES = 4
 # No way leads through a vertex of more neighbours than this: the rim of a fan of n faces would hold n * n pairs.
 HUB = 1024
 # Above this many neighbours a row is united on its own.
