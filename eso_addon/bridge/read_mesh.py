@@ -4,29 +4,59 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import Any
 
 import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.attributes import Attribute
 from ..core.mesh import MeshError
 from .attributes import read_attribute
+from .layers import Layer, for_engine, read_layers
 from .left_behind import names_left_behind
+from .shape_keys import ShapeKeys, read_keys, with_shapes
+from .vertex_groups import VertexGroups, read_groups
 
 
 @dataclass(frozen=True, eq=False)
 class MeshArrays:
-    """What is read of a mesh object; `materials` are references, everything else is free of Blender."""
+    """What is read of a mesh object; materials, `template` and the keys' source are references to Blender's data."""
 
     vertices: NDArray[np.float64]  # (n, 3), after `transform`
     triangles: NDArray[np.int64]  # (m, 3) vertex indices
     triangle_corners: NDArray[np.int64]  # (m, 3) corner indices
     triangle_polygon: NDArray[np.int64]  # (m,)
+    polygon_sizes: NDArray[np.int64]  # (p,) corners of each polygon
+    edges: NDArray[np.int64]  # (e, 2) vertex indices
     material_index: NDArray[np.int32]  # (m,)
     smooth: NDArray[np.bool_]  # (m,)
     transform: NDArray[np.float64]  # (4, 4), object space to the space of `vertices`
     materials: tuple["bpy.types.Material | None", ...]
     left_behind: tuple[str, ...]  # data that simplified meshes lose, by name
+    template: bpy.types.Mesh  # for what a mesh has besides elements
+    layers: tuple[Layer, ...] = ()
+    active: dict[str, str] | None = None  # names of active and rendered layers
+    normals: NDArray[np.float32] | None = None  # (corners, 3) custom normals
+    free_normals: bool = False  # how Blender stores them
+    groups: VertexGroups | None = None
+    keys: ShapeKeys | None = None
+
+    @property
+    def carried(self) -> dict[str, Any]:
+        """What the mesh carries, as options of the engine."""
+        attributes = for_engine(self.layers, self.triangle_corners, self.triangle_polygon)
+        if self.normals is not None:
+            attributes[NORMALS] = Attribute(self.normals[self.triangle_corners], "corner", "normal")
+        if self.groups is not None:
+            attributes[GROUPS] = Attribute(self.groups.weights, "vertex", "value")
+        if self.keys is not None:
+            attributes[KEYS] = Attribute(self.keys.offsets.transpose(1, 0, 2), "vertex", "value")
+        return {"attributes": attributes, "edges": self.edges} if attributes else {}
+
+
+# What these are called beside the mesh's own attributes.
+NORMALS, GROUPS, KEYS = "custom normals", "vertex groups", "shape keys"
 
 
 def read_mesh(
@@ -35,6 +65,7 @@ def read_mesh(
     apply_modifiers: bool = True,
     depsgraph: bpy.types.Depsgraph | None = None,
     transform: NDArray[np.float64] | None = None,
+    carry: bool = False,
 ) -> MeshArrays:
     """Read a mesh object, in Edit Mode too.
 
@@ -43,11 +74,14 @@ def read_mesh(
     obj : bpy.types.Object
         A mesh object; may be linked or hidden.
     apply_modifiers : bool
-        Read the mesh as modifiers and shape keys leave it, not as it is stored.
+        Read the mesh as modifiers leave it, not as it is stored.
     depsgraph : bpy.types.Depsgraph, optional
         Where modifiers are evaluated; the context's by default.
     transform : ndarray, (4, 4) float64, optional
         Put on the vertices. By default the scale part of the object's world matrix, so that lengths are the scene's.
+    carry : bool
+        Read all that the mesh carries, and the neutral shape of a mesh with shape keys; without it only the shape,
+        with its keys as they are mixed now.
 
     Returns
     -------
@@ -64,17 +98,49 @@ def read_mesh(
         transform = scale_transform(obj)
     if obj.data.is_editmode:
         obj.update_from_editmode()
-    if apply_modifiers and is_changed_by_evaluation(obj):
+    keys = read_keys(obj.data) if carry else None
+    if apply_modifiers and (_has_modifiers(obj) or (not carry and obj.data.shape_keys is not None)):
         depsgraph = depsgraph or bpy.context.evaluated_depsgraph_get()
-        with _evaluated_mesh(obj, depsgraph) as mesh:
-            return _arrays_of(obj, mesh, transform)
+        lost = ""
+        if keys is not None:
+            keys, lost = _evaluated_keys(obj, keys, depsgraph)
+        with _shown_key(obj, 0 if keys is not None else None), _evaluated_mesh(obj, depsgraph) as mesh:
+            return _arrays_of(obj, mesh, transform, keys, carry=carry, lost=lost)
     with _stored_mesh(obj) as mesh:
-        return _arrays_of(obj, mesh, transform)
+        return _arrays_of(obj, mesh, transform, keys, carry=carry)
 
 
-def is_changed_by_evaluation(obj: bpy.types.Object) -> bool:
-    """Tell whether modifiers or shape keys make the mesh another one than is stored."""
-    return obj.data.shape_keys is not None or any(modifier.show_viewport for modifier in obj.modifiers)
+def _has_modifiers(obj: bpy.types.Object) -> bool:
+    return any(modifier.show_viewport for modifier in obj.modifiers)
+
+
+@contextmanager
+def _shown_key(obj: bpy.types.Object, number: int | None) -> Iterator[None]:
+    """Have Blender evaluate an object with one of its shape keys alone."""
+    if number is None:
+        yield
+        return
+    before = obj.show_only_shape_key, obj.active_shape_key_index
+    try:
+        obj.show_only_shape_key, obj.active_shape_key_index = True, number
+        bpy.context.view_layer.update()
+        yield
+    finally:
+        obj.show_only_shape_key, obj.active_shape_key_index = before
+        bpy.context.view_layer.update()
+
+
+def _evaluated_keys(obj: bpy.types.Object, keys: ShapeKeys,
+                    depsgraph: bpy.types.Depsgraph) -> tuple[ShapeKeys | None, str]:
+    """Read shape keys as modifiers leave them; if these do not leave all of them the same vertices, say so."""
+    shapes = []
+    for number in range(len(keys.names)):
+        with _shown_key(obj, number), _evaluated_mesh(obj, depsgraph) as mesh:
+            positions = read_attribute(mesh, "position")
+            shapes.append(np.zeros((0, 3), np.float32) if positions is None else positions)
+    if len({len(shape) for shape in shapes}) > 1:
+        return None, f"shape keys ({', '.join(keys.names)}): modifiers make another mesh of each"
+    return with_shapes(keys, np.stack(shapes)), ""
 
 
 def scale_transform(obj: bpy.types.Object) -> NDArray[np.float64]:
@@ -135,26 +201,59 @@ def _stored_mesh(obj: bpy.types.Object) -> Iterator[bpy.types.Mesh]:
         obj.to_mesh_clear()
 
 
-def _arrays_of(obj: bpy.types.Object, mesh: bpy.types.Mesh, transform: NDArray[np.float64]) -> MeshArrays:
+def _arrays_of(obj: bpy.types.Object, mesh: bpy.types.Mesh, transform: NDArray[np.float64], keys: ShapeKeys | None, *,
+               carry: bool, lost: str = "") -> MeshArrays:
     corners, polygon = _triangulated(mesh)
     corner_vertex = _read_or(mesh, ".corner_vert", len(mesh.loops), np.int32)
     positions = read_attribute(mesh, "position")
     vertices = np.zeros((0, 3)) if positions is None else positions.astype(np.float64)
+    if keys is not None and len(keys.offsets[0]) == len(vertices) and mesh == obj.data:
+        vertices = keys.neutral.astype(np.float64)
     if not np.array_equal(transform, np.eye(4)):
         vertices = vertices @ transform[:3, :3].T + transform[:3, 3]
     material = _read_or(mesh, "material_index", len(mesh.polygons), np.int32)
     sharp = _read_or(mesh, "sharp_face", len(mesh.polygons), np.bool_)
+    edges = read_attribute(mesh, ".edge_verts")
+    sizes = np.bincount(polygon, minlength=len(mesh.polygons)) + 2
     return MeshArrays(
         vertices=vertices,
         triangles=corner_vertex[corners].astype(np.int64).reshape(-1, 3),
         triangle_corners=corners.astype(np.int64).reshape(-1, 3),
         triangle_polygon=polygon.astype(np.int64),
+        polygon_sizes=sizes,
+        edges=np.zeros((0, 2), np.int64) if edges is None else edges.astype(np.int64),
         material_index=material[polygon],
         smooth=~sharp[polygon],
         transform=transform,
         materials=tuple(material and material.original for material in mesh.materials),
-        left_behind=names_left_behind(obj, mesh, corner_vertex),
+        left_behind=names_left_behind(mesh, lost),
+        template=obj.data,
+        **(_carried_of(obj, mesh, keys) if carry else {}),
     )
+
+
+def _carried_of(obj: bpy.types.Object, mesh: bpy.types.Mesh, keys: ShapeKeys | None) -> dict[str, Any]:
+    """Read what a mesh carries."""
+    normals = None
+    if mesh.has_custom_normals:
+        normals = np.zeros(len(mesh.loops) * 3, np.float32)
+        mesh.corner_normals.foreach_get("vector", normals)
+        normals = normals.reshape(-1, 3)
+    custom = mesh.attributes.get("custom_normal")
+    active = {
+        "uv": mesh.uv_layers.active.name if mesh.uv_layers.active else "",
+        "uv_render": next((layer.name for layer in mesh.uv_layers if layer.active_render), ""),
+        "color": mesh.attributes.active_color_name or "",
+        "color_render": mesh.attributes.default_color_name or "",
+    }
+    return {
+        "layers": read_layers(mesh),
+        "active": active,
+        "normals": normals,
+        "free_normals": custom is not None and custom.data_type == "FLOAT_VECTOR",
+        "groups": read_groups(obj, mesh),
+        "keys": keys,
+    }
 
 
 def _triangulated(mesh: bpy.types.Mesh) -> tuple[NDArray[np.int32], NDArray[np.int32]]:

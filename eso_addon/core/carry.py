@@ -148,8 +148,7 @@ def _closest(points: Floats, faces: Ints, target: Ints, there: Floats, corner: I
     near_faces, wedges = (np.concatenate(rows) for rows in
                           zip(*blocks.map(near, faces.shape[1], _BLOCK), strict=True))
     used, number = np.unique(near_faces, return_inverse=True)
-    near_corners: Ints = faces.take(used, axis=1).T
-    frames = triangle_frames(points.T, near_corners)
+    frames = triangle_frames(points.T, np.ascontiguousarray(faces.take(used, axis=1).T))
     squared = np.empty(len(wedges))
 
     def measure(part: slice) -> None:

@@ -126,7 +126,7 @@ def find_lines(mesh: Prepared, input_faces: Ints, attributes: AttributeSet, igno
             found = _marked(layer, mesh.vertex.take(attributes.edges), keys.take(one), count)
         else:
             found = _jumps(layer, at_corner[layer.domain].take(pairs))
-        if found.mean() > _MOST and len(found) > 12:
+        if found.sum() > max(_MOST * len(found), 12):
             messages.append(f"{layer.name} differs across most edges: it is carried, but holds none of them")
         else:
             kinds[found] |= bits

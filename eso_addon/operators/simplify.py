@@ -47,10 +47,11 @@ class OBJECT_OT_eso_simplify(EngineOperator, SimplifyOptions, bpy.types.Operator
         reason = objects.why_not_in_place(self._object) if self.in_place else ""
         if reason:
             raise MeshError(reason)
-        self._source = read_mesh(self._object, apply_modifiers=self.apply_modifiers)
+        self._source = read_mesh(self._object, apply_modifiers=self.apply_modifiers, carry=True)
         targets = {f"{name}s": [value] for name, value in self.simplify_target().items()}
         arrays = self._source.vertices, self._source.triangles
-        return with_errors_if_run(replayed_steps(*arrays, targets=targets, options=self.engine_options()))
+        options = {**self.engine_options(), **self._source.carried}
+        return with_errors_if_run(replayed_steps(*arrays, targets=targets, options=options))
 
     def finish(self, context: bpy.types.Context, results: list[SimplifyResult]) -> None:
         """Write the result beside the source, or in its place."""

@@ -26,13 +26,16 @@ OPTIONS = [
 def test_operator_and_api_give_equal_arrays(options: dict) -> None:
     obj = add_sphere()
     vertices, triangles = arrays(obj)
+    carried = read_mesh(obj, carry=True).carried
     target = {"faces_target": "count", "max_error": "error"}.get(next(iter(options)), "ratio")
     assert simplify_active(target=target, **options) == {"FINISHED"}
-    wanted = simplify(vertices, triangles, **_as_single_precision(options))
+    wanted = simplify(vertices, triangles, **_as_single_precision(options), **carried)
     new = bpy.context.object
     got_vertices, got_triangles = arrays(new)
     assert np.array_equal(got_vertices, wanted.vertices.astype(np.float32))
     assert np.array_equal(got_triangles, wanted.faces)
+    uv = np.array([loop.uv for loop in new.data.uv_layers["UVMap"].data])
+    assert np.array_equal(uv, wanted.attributes["UVMap"].reshape(-1, 2))
     assert new["eso_triangles"] == len(wanted.faces)
     assert new["eso_error"] == wanted.error
     assert not new.data.validate()
@@ -124,10 +127,13 @@ def test_material_slots_and_indices_are_kept() -> None:
 
 
 def test_what_is_not_carried_is_reported() -> None:
-    obj = add_sphere()
-    obj.vertex_groups.new(name="Arm")
-    simplify_active(ratio=0.3)
-    assert "Not carried: UV maps (UVMap), vertex groups (Arm)" in bpy.context.window_manager.eso_last_run.lines
+    obj = add_cube()
+    obj.shape_key_add(name="Basis")
+    for point in obj.shape_key_add(name="Flat", from_mix=False).points:
+        point.co.z = 0
+    obj.modifiers.new("Merge", "WELD").merge_threshold = 0.1
+    simplify_active(ratio=0.5)
+    assert "Not carried: shape keys (Basis, Flat)" in bpy.context.window_manager.eso_last_run.lines
 
 
 def test_the_report_has_counts_error_and_seconds() -> None:
