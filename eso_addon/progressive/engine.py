@@ -4,12 +4,17 @@
 from __future__ import annotations
 
 from collections.abc import Generator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from ..core.attributes import Attribute
 from ..core.blocks import Blocks
-from ..core.collapse import Rules, collapse_steps
+from ..core.collapse import collapse_steps
+from ..core.feature_collapse import guide_for
+from ..core.features import sharp_edges
+from ..core.guidance import Guidance, guidance_of
 from ..core.mesh import Bools, Floats, Ints, MeshError
 from ..core.options import Options
 from ..core.prepare import Prepared, prepare
@@ -60,7 +65,8 @@ def tangled(faces: Ints, count: int) -> Bools:
     return bad
 
 
-def run_engine(mesh: Prepared, locked: Bools, options: Options, target: int) -> Generator[int, None, CollapseRecord]:
+def run_engine(mesh: Prepared, locked: Bools, lines: Ints, options: Options,
+               target: int) -> Generator[int, None, CollapseRecord]:
     """Collapse down to a number of faces; yields faces left.
 
     Parameters
@@ -68,18 +74,50 @@ def run_engine(mesh: Prepared, locked: Bools, options: Options, target: int) -> 
     mesh : Prepared
     locked : ndarray, (n,) bool
         The engine's vertices that must not go.
+    lines : ndarray, (e, 2) int64
+        Edges where attributes jump, in the numbers of the input: see `lines_of`.
     options : Options
     target : int
     """
     blocks = Blocks(options.threads)
     try:
-        quadrics = initial_quadrics(mesh, options, blocks)
-        rules = Rules(True, options.memory, options.flip, options.guard, options.share, options.spread,
-                      options.method == "cf")
+        told = Guidance(None, None, None, None, None)
+        if len(lines):
+            marks = {"line": Attribute(np.ones(len(lines), bool), "edge", "seam")}
+            # no face of the input is looked at: marks are on edges alone
+            none = np.zeros((len(mesh.vertex), 3)), np.zeros((int(mesh.face.max(initial=-1)) + 1, 3), np.int64)
+            told = guidance_of(mesh, none, replace(options, attributes=marks, edges=lines))
+        guide = guide_for(mesh, options, told.edges) if options.method == "feature" else None
+        quadrics = initial_quadrics(mesh, options, blocks, told)
         return (yield from collapse_steps(mesh.points, mesh.faces, quadrics, mesh.opened,
-                                          locked if locked.any() else None, target, rules, blocks))
+                                          locked if locked.any() else None, target, options.rules, blocks, guide,
+                                          told.guard))
     finally:
         blocks.close()
+
+
+def lines_of(points: Floats, faces: Ints, wedges: Ints, material: Ints, marked: Bools) -> Ints:
+    """Find where attributes jump: (e, 2) vertices; nothing where they jump at more than half of the edges.
+
+    Parameters
+    ----------
+    points : ndarray, (n, 3) float64
+    faces, wedges : ndarray, (3, m) int64
+        Corners, and the kind of attributes that each has at its vertex.
+    material : ndarray, (m,) int64
+    marked : ndarray, (3, m) bool
+        Sides that are lines whatever is beside them.
+    """
+    corner_values = [wedges.T] if wedges.any() else []
+    face_values = [material] if material.any() else []
+    rows = np.nonzero(marked.T)
+    ends = np.stack((faces.T[rows], np.roll(faces, -1, axis=0).T[rows]), axis=1)
+    if not (corner_values or face_values or len(ends)):
+        return np.zeros((0, 2), np.int64)
+    lines = sharp_edges(points, faces.T, face_values=face_values, corner_values=corner_values, marked=ends)
+    if corner_values and 2 * len(lines) > faces.shape[1] * 3 // 2:
+        lines = sharp_edges(points, faces.T, face_values=face_values, marked=ends)
+    return lines
 
 
 def endpoint_options(preset_options: dict[str, Any]) -> Options:
@@ -87,4 +125,5 @@ def endpoint_options(preset_options: dict[str, Any]) -> Options:
     unknown = sorted(set(preset_options) - set(Options.__dataclass_fields__))
     if unknown:
         raise MeshError(f"unknown option {unknown[0]!r}: choose from {', '.join(Options.__dataclass_fields__)}")
-    return Options(**{**preset_options, "placement": "endpoint", "refit": False, "weld": False})
+    # the plain quadrics give the better levels where survivors stay: docs/decisions/stream.md
+    return Options(**{"method": "qem", **preset_options, "placement": "endpoint", "refit": False, "weld": False})

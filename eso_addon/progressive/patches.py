@@ -9,11 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from ..core.mesh import Ints, morton_order
+from ..core.mesh import Floats, Ints, morton_order
 from .batch_codec import Splits
-from .engine import endpoint_options, prepared, run_engine, tangled
+from .engine import endpoint_options, lines_of, prepared, run_engine, tangled
+from .estimate import estimated_errors
 from .history import Batch, Unwinding
-from .source import Source
+from .source import Source, distinct, rows_as_bytes
 
 _ROUNDS = 12
 # with at least this part of the vertices left, collapses are looked at for one batch until they are that part of
@@ -98,10 +99,12 @@ def make_patches(source: Source, target: int, options: dict[str, Any]) -> Genera
     locked[source.faces[beside]] = True
     locked[source.vertex_place[source.edges]] = True
     corner = _corner_columns(mesh.turned, mesh.faces.shape[1])
+    jumps = _Jumps(source, faces, corner)
     wedges = source.wedge.ravel().take(faces * 3 + corner)
     unwinding = Unwinding(points, mesh.source.take(mesh.faces), wedges)
     total = max(len(source.faces) - target, 1)
     batches: list[Batch] = []
+    costs = np.zeros(len(points))
     for attempt in range(_ROUNDS):
         held = int(unwinding.held.sum())
         if attempt:
@@ -109,7 +112,8 @@ def make_patches(source: Source, target: int, options: dict[str, Any]) -> Genera
             if mesh is None:
                 break
         own = tangled(mesh.faces, mesh.points.shape[1]) | (locked | unwinding.held).take(mesh.source)
-        run = run_engine(mesh, own, chosen, target)
+        lines = jumps.lines(points, unwinding)
+        run = run_engine(mesh, own, lines, chosen, target)
         while True:
             try:
                 yield min(max((len(source.faces) - next(run)) / total, 0.0), 1.0)
@@ -117,12 +121,16 @@ def make_patches(source: Source, target: int, options: dict[str, Any]) -> Genera
                 record = end.value
                 break
         removed, kept = mesh.source.take(record.removed), mesh.source.take(record.kept)
+        costs[removed] = record.cost
         vertices = int(np.count_nonzero(np.bincount(unwinding.faces.ravel())))
         batches += _regrouped(unwinding, removed, kept, record.batch_starts, vertices)
         if int(unwinding.held.sum()) == held:
             break
         unwinding.frozen[:] = False
-    return _Numbering(source, unwinding, faces, batches[::-1], corner).patches()
+    numbering = _Numbering(source, unwinding, faces, batches[::-1], corner)
+    patches = numbering.patches()
+    patches.errors = estimated_errors(patches, costs.take(np.argsort(numbering.place)))
+    return patches
 
 
 def _regrouped(mesh: Unwinding, removed: Ints, kept: Ints, starts: Ints, vertices: int) -> Generator[Batch, None, None]:
@@ -163,6 +171,33 @@ def _corner_columns(turned: np.ndarray | None, width: int) -> Ints:
     return columns
 
 
+class _Jumps:
+    """Where attributes jump between the faces of a mesh: UV, materials, and marks of edges."""
+
+    def __init__(self, source: Source, faces: Ints, corner: Ints) -> None:
+        named = source.attributes
+        values = [array for array in named["corner"].values() if array.dtype == np.float32 and array.shape[2:] == (2,)]
+        flat = [array.reshape(-1, 2) for array in values]
+        kind = distinct(rows_as_bytes(dict(enumerate(flat)), 3 * len(source.faces)))
+        # a vertex's wedges may differ in other attributes alone
+        self._kind = kind.take(source.wedge_corner, mode="clip")
+        self._starts = source.wedge_starts
+        materials = named["face"].get("material_index")
+        self._material = np.zeros(len(faces), np.int64) if materials is None else materials.take(faces).astype(np.int64)
+        self._marks = np.zeros((3, len(faces)), bool)
+        for name, array in named["side"].items():
+            if array.dtype == bool and array.ndim == 2 and not name.startswith("."):
+                self._marks |= array.ravel().take(faces * 3 + corner)
+        # a turned face's sides start one corner later
+        turned = corner[1] != 1
+        self._marks[:, turned] = np.roll(self._marks[:, turned], -1, axis=0)
+
+    def lines(self, points: Floats, mesh: Unwinding) -> Ints:
+        """Return the edges at which attributes jump, in a mesh on its way down."""
+        kind = self._kind.take(self._starts.take(mesh.faces) + mesh.wedges)
+        return lines_of(points, mesh.faces, kind, self._material.take(mesh.ids), self._marks.take(mesh.ids, axis=1))
+
+
 class _Numbering:
     """Numbers places, faces, wedges and vertices from the base up."""
 
@@ -179,8 +214,7 @@ class _Numbering:
         for batch in batches:
             gone[batch.new] = True
         base = np.flatnonzero(~gone)
-        self.order = [self._along(base)]
-        self.place[self.order[0]] = np.arange(len(base))
+        self.place[self._along(base)] = np.arange(len(base))
         self.parents = [np.full(len(base), -1)]
         ids = np.zeros(0, np.int64) if mesh is None else mesh.ids
         rows = np.zeros((3, 0), np.int64) if mesh is None else self.place.take(mesh.faces)
@@ -220,7 +254,6 @@ class _Numbering:
         self.pending = (there, opened)
         self.splits.append(Splits(old, start, batch.length.take(order), third, np.zeros((0, 3), np.int64)))
         self._fill_third(batch, order, new, third, there, opened)
-        self.order.append(new)
         self.parents.append(old)
         self.places += len(new)
         self.width += len(ids)
@@ -233,7 +266,7 @@ class _Numbering:
 
     def patches(self) -> Patches:
         source = self.source
-        order = np.concatenate(self.order)
+        order = np.argsort(self.place)
         ids = np.concatenate(self.face_ids)
         counts = np.diff(source.wedge_starts).take(order)
         starts = np.concatenate(([0], np.cumsum(counts)))

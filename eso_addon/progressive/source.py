@@ -108,7 +108,7 @@ def _attributes(given: Mapping[str, Mapping[str, ArrayLike]], counts: dict[str, 
     return checked
 
 
-def rows_as_bytes(named: Mapping[str, np.ndarray], rows: int) -> np.ndarray:
+def rows_as_bytes(named: Mapping[Any, np.ndarray], rows: int) -> np.ndarray:
     """Return all attributes of a domain as (rows, bytes) uint8, side by side."""
     parts = [np.ascontiguousarray(array).reshape(rows, -1).view(np.uint8).reshape(rows, -1) for array in named.values()]
     return np.concatenate([np.zeros((rows, 0), np.uint8), *parts], axis=1)
@@ -117,7 +117,7 @@ def rows_as_bytes(named: Mapping[str, np.ndarray], rows: int) -> np.ndarray:
 def _wedges(corners: Ints, place: Ints, places: int, named: dict[str, np.ndarray]) -> tuple[Ints, Ints, Ints, Ints]:
     """Give numbers to the different (vertex, corner attributes) at each place."""
     flat = corners.ravel()
-    kind = _distinct(rows_as_bytes(named, len(flat))) if named else np.zeros(len(flat), np.int64)
+    kind = distinct(rows_as_bytes(named, len(flat))) if named else np.zeros(len(flat), np.int64)
     kinds = int(kind.max(initial=0)) + 1
     unused = np.ones(len(place), bool)
     unused[flat] = False
@@ -138,7 +138,7 @@ def _wedges(corners: Ints, place: Ints, places: int, named: dict[str, np.ndarray
     return wedge.reshape(corners.shape), starts, vertex.take(order), np.where(first < len(flat), first, -1)
 
 
-def _distinct(rows: np.ndarray) -> Ints:
+def distinct(rows: np.ndarray) -> Ints:
     """Give numbers to the different rows of bytes: (n,) int64."""
     if rows.shape[1] == 0:
         return np.zeros(len(rows), np.int64)
