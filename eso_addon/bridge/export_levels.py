@@ -82,8 +82,7 @@ def export_levels(path: Path, groups: Sequence[LevelGroup], layout: str, write: 
     with empties as children, _marked(groups, layout):
         names |= {empty: base for empty, (base, _) in children.items()}
         parents |= {level: empty for empty, (_, levels) in children.items() for level in levels}
-        with staged(path.stem, names, parents), hooked() if layout == "msft_lod" else nullcontext(), \
-                atomic_output(path) as draft:
+        with staged(path.stem, names, parents), hooked(), atomic_output(path) as draft:
             write(draft)
 
 

@@ -235,6 +235,11 @@ def write_triangles(path: Path, vertices: NDArray[np.float32], faces: NDArray[np
         write_scene(path, [obj])
 
 
+def write_stage(path: Path) -> None:
+    """Write the scene in the window, and nothing else of the file, as a .blend file."""
+    bpy.data.libraries.write(str(path), {bpy.context.scene}, path_remap="ABSOLUTE")
+
+
 def write_scene(path: Path, objects: Sequence[bpy.types.Object]) -> None:
     """Write objects to a file that appears whole or not at all; a .blend file takes the rest of the scene too.
 

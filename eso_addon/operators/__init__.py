@@ -8,6 +8,8 @@ _MODULES = (
     "simplify",
     "lod_generate",
     "lod_update",
+    "lod_export",
+    "lod_hulls",
     "measure",
     "weights_show",
     "edges_show",

@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+# Blender reads properties from annotations that are calls:
+# mypy: disable-error-code="valid-type"
+"""The operator that adds collision hulls to levels, named for their engine."""
+
+import bpy
+from bpy.props import EnumProperty
+
+from ..bridge import level_info, objects
+from ..bridge.hulls import add_hulls
+from ..bridge.level_names import check_free
+from ..bridge.lod_sources import meshes_behind
+from ..bridge.place_levels import remove_with_mesh
+from ..core.mesh import MeshError
+from ..settings.profiles import PROFILES
+from .lod_polls import why_not_update
+from .polls import poll_with
+from .reports import tell
+
+_KINDS = (
+    ("one", "One", "One hull around the whole object"),
+    ("parts", "Parts", "A hull around each connected part"),
+)
+
+
+class OBJECT_OT_eso_lod_hulls(bpy.types.Operator):
+    """Add convex collision hulls to the levels of the selected objects, named as their engine wants them"""
+
+    bl_idname = "object.eso_lod_hulls"
+    bl_label = "ESO Collision Hulls"
+    bl_options = {"REGISTER", "UNDO"}
+
+    kind: EnumProperty(name="Hulls", items=_KINDS, default="one")
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Need levels."""
+        return poll_with(cls, why_not_update(context))
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Replace the hulls that are there."""
+        chosen = meshes_behind([obj for obj in [context.active_object, *context.selected_objects] if obj is not None])
+        sources = {obj: level_info.levels_of(obj) for obj in chosen}
+        sources = {obj: levels for obj, levels in sources.items() if levels}
+        try:
+            if not sources:
+                raise MeshError("none of the selected objects has levels: generate some first")
+            made = [hull for obj, levels in sources.items() for hull in self._replace(obj, levels[0])]
+        except MeshError as error:
+            self.report({"ERROR"}, str(error)[:1].upper() + str(error)[1:])
+            return {"CANCELLED"}
+        faces = sum(objects.triangle_count(hull) for hull in made)
+        tell(self, context, f"Collision hulls of {next(iter(sources)).name}", [f"{len(made)} hulls",
+                                                                              f"{faces:,} triangles"])
+        return {"FINISHED"}
+
+    def _replace(self, source: bpy.types.Object, finest: bpy.types.Object) -> list[bpy.types.Object]:
+        profile = PROFILES.get(str(finest.get(level_info.PROFILE, "")), PROFILES["plain"])
+        old = level_info.hulls_of(source)
+        if not profile.hull:
+            raise MeshError(f"{profile.label} has no names for collision hulls: make the levels for an engine that has")
+        check_free([profile.hull_name(source.name, 1)], old)
+        names = {hull: hull.name for hull in old}
+        for hull in old:
+            hull.name = "eso_lod old hull"
+        try:
+            made = add_hulls(source, finest, source.name, profile.hull_name, self.kind)
+        except MeshError:
+            for hull, name in names.items():
+                hull.name = name
+            raise
+        for hull in old:
+            remove_with_mesh(hull)
+        for hull in made:
+            hull.data.name = hull.name
+        return made
+
+
+OPERATOR = OBJECT_OT_eso_lod_hulls
