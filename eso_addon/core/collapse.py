@@ -648,20 +648,21 @@ def _reject(state: _State, batch: _Batch, rejected: Bools) -> Bools:
     _withdraw(state, batch, rejected)
     outcast = np.append(False, rejected)
 
-    def renew(block: slice) -> _Touched:
+    def renew(block: slice) -> tuple[Ints, Ints]:
         touched = batch.touched[block.start]
         face = touched.mixed.take(_among(outcast, [row.take(touched.mixed) for row in touched.label]))
         batch.unsure[_after_another(touched.label.take(face, axis=1), outcast)] = True
         label = state.label.take(touched.corner.take(face, axis=1))
         touched.label[:, face] = label
         touched.gone[face] = _removers(label)
-        return touched.take(face.take(np.flatnonzero((label >= 0).any(axis=0))))
+        return label, _flips(state, touched.take(face))
 
-    renewed = _joined(state.blocks.map(renew, len(batch.touched), 1))
+    renewed = state.blocks.map(renew, len(batch.touched), 1)
     failed = np.zeros(len(rejected), bool)
-    failed[_flips(state, renewed)] = True
+    failed[np.concatenate([flipped for _, flipped in renewed])] = True
     beside = np.zeros(len(rejected) + 1, bool)
-    beside[renewed.label[renewed.label >= 0] + 1] = True
+    for label, _ in renewed:
+        beside[label[label >= 0] + 1] = True
     again = np.flatnonzero(beside[1:])
     if state.rules.guard and len(again):
         stars = state.blocks.map(lambda block: batch.touched[block.start].take(
