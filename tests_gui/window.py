@@ -126,16 +126,24 @@ def under_mouse() -> str:
     return ""
 
 
-def find(what: str, found: list[tuple[int, int]], *, x: float = 0.6, top: int = 0) -> Steps:
-    """Look for a button in the sidebar from the top down, by what it does; appends where it is to `found`."""
+def find(what: str, found: list[tuple[int, int]], *, x: float = 0.6) -> Steps:
+    """Look for a button in the sidebar from the top down, by what it does; appends where it is to `found`.
+
+    Where it is not in sight the sidebar is scrolled: up first, then down.
+    """
     area = region("UI")
-    across = area.x + int((area.width - 20) * x)
-    for y in range(area.y + area.height - 30 - top, area.y + 5, -9):
-        move(across, y)
-        yield 0.12
-        if what in under_mouse():
-            found.append((across, y - 3))
-            return
+    across, middle = area.x + int((area.width - 20) * x), area.y + area.height // 2
+    for wheel in ("", "WHEELUPMOUSE", "WHEELDOWNMOUSE", "WHEELDOWNMOUSE"):
+        for _ in range(8 if wheel else 0):
+            move(across, middle)
+            press(wheel, across, middle)
+            yield 0.05
+        for y in range(area.y + area.height - 30, area.y + 5, -9):
+            move(across, y)
+            yield 0.06
+            if what in under_mouse():
+                found.append((across, y - 3))
+                return
     raise AssertionError(f"no button for {what} in the sidebar")
 
 

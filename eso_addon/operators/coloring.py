@@ -37,9 +37,11 @@ def overlay_of_values(
     """
     finite = values[np.isfinite(values)]
     low, high = np.percentile(finite, _ENDS) if len(finite) else (0.0, 0.0)
+    least = max(low, high * 1e-4, 1e-300)  # in equal factors: few vertices have most of the weight
+    colors = ramp(np.log(np.nan_to_num(values).clip(least)), float(np.log(least)), float(np.log(max(high, least))))
     overlay = Overlay(
-        kind, obj.name, in_object_space(source.vertices, source), source.triangles.astype(np.int32),
-        ramp(np.nan_to_num(values), float(low), float(high)), title=title, low=f"{low:.3g}", high=f"{high:.3g}",
+        kind, obj.name, in_object_space(source.vertices, source), source.triangles.astype(np.int32), colors,
+        title=title, low=f"{least if len(finite) else 0:.3g}", high=f"{high:.3g}",
     )  # fmt: skip
     show(overlay)
     return overlay

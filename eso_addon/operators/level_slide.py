@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The level slider: every level of the active mesh under the mouse, drawn while dragged, written when let go."""
+"""The level slider: every level of the active mesh under the mouse, drawn while dragged, written when it rests."""
 
 import time
 from typing import Any
@@ -16,6 +16,7 @@ from .simplify import OBJECT_OT_eso_simplify
 # What stays the user's own while the slider is out, beside what is over the sidebar.
 _VIEW_EVENTS = {"MIDDLEMOUSE", "WHEELUPMOUSE", "WHEELDOWNMOUSE", "MOUSEMOVE", "TRACKPADPAN", "TRACKPADZOOM"}
 _POLL_SECONDS = 0.1
+_REST_SECONDS = 0.25
 
 _sessions: list["OBJECT_OT_eso_level_slide"] = []
 
@@ -32,7 +33,7 @@ def show_level(context: bpy.types.Context) -> None:
 
 
 class OBJECT_OT_eso_level_slide(EngineOperator, SimplifyOptions, bpy.types.Operator):
-    """Drag through all levels of the active mesh; a level becomes an object when the mouse is let go"""
+    """Drag through all levels of the active mesh; where the slider rests, the level becomes an object"""
 
     bl_idname = "object.eso_level_slide"
     bl_label = "ESO Level Slider"
@@ -49,6 +50,7 @@ class OBJECT_OT_eso_level_slide(EngineOperator, SimplifyOptions, bpy.types.Opera
     _name: str
     _result_name: str
     _dragged: bool
+    _moved: float
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -76,10 +78,10 @@ class OBJECT_OT_eso_level_slide(EngineOperator, SimplifyOptions, bpy.types.Opera
             self.ending = "keep"
         if self.ending:
             return self._end(context)
-        if event.type == "LEFTMOUSE" and event.value == "RELEASE" and self._dragged:
+        # The slider keeps the mouse's release to itself, so that a rest stands for it.
+        if event.type == "TIMER" and self._dragged and time.perf_counter() - self._moved > _REST_SECONDS:
             self._write(context)
-        over_sidebar = context.region is not None and context.region.type == "UI"
-        return {"PASS_THROUGH"} if over_sidebar or event.type in _VIEW_EVENTS else {"RUNNING_MODAL"}
+        return {"PASS_THROUGH"} if event.type in _VIEW_EVENTS or _over_sidebar(context, event) else {"RUNNING_MODAL"}
 
     def cancel(self, context: bpy.types.Context) -> None:
         """Leave everything as it was when Blender takes the operator away."""
@@ -95,7 +97,7 @@ class OBJECT_OT_eso_level_slide(EngineOperator, SimplifyOptions, bpy.types.Opera
         self.faces, points, corners = self._view.at(share)
         self._result_hidden(True)
         shown.show(shown.Overlay("level", self._object.name, points, corners))
-        self._dragged = True
+        self._dragged, self._moved = True, time.perf_counter()
         self.milliseconds.append(1000 * (time.perf_counter() - begun))
 
     def _finished(self, context: bpy.types.Context, result: Any) -> set[str]:  # noqa: ANN401
@@ -158,6 +160,16 @@ class OBJECT_OT_eso_level_slide(EngineOperator, SimplifyOptions, bpy.types.Opera
         if result is not None:
             bpy.data.meshes.remove(result.data)  # the object goes with it
         self._result_name = ""
+
+
+def _over_sidebar(context: bpy.types.Context, event: bpy.types.Event) -> bool:
+    """Tell whether the mouse is where the slider and its buttons are."""
+    for area in context.window.screen.areas:
+        for region in area.regions if area.type == "VIEW_3D" else ():
+            right, above = event.mouse_x - region.x, event.mouse_y - region.y
+            if region.type == "UI" and 0 <= right < region.width and 0 <= above < region.height:
+                return True
+    return False
 
 
 class OBJECT_OT_eso_level_slide_end(bpy.types.Operator):

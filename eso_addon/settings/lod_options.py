@@ -78,10 +78,10 @@ class LodOptions(EngineOptions):
         default=True,
     )
     live_mirror: BoolProperty(
-        name="Mirror Stays Live", description="Simplify one half; the levels keep the Mirror modifier", default=False
+        name="Live Mirror", description="Simplify one half; the levels keep the Mirror modifier", default=False
     )
     live_subdivision: BoolProperty(
-        name="Subdivision Stays Live",
+        name="Live Subdivision",
         description="Simplify the cage; the levels keep the Subdivision Surface modifier",
         default=False,
     )
@@ -95,6 +95,11 @@ class LodOptions(EngineOptions):
             for name in ("pixel_error", "resolution", "lens"):
                 layout.prop(self, name)
         layout.prop(self, "profile")
+        if as_text:
+            self.draw_places(layout)
+
+    def draw_places(self, layout: bpy.types.UILayout) -> None:
+        """Draw which meshes get levels, where these go, and what stays live on them."""
         layout.prop(self, "scope")
         if self.scope == "COLLECTION":
             layout.prop_search(self, "source_collection", bpy.data, "collections")

@@ -57,8 +57,10 @@ def _surface_batch(overlay: Overlay) -> Any:  # noqa: ANN401
         colors = overlay.colors
         if colors is None:
             colors = np.broadcast_to(np.array(_CLAY, np.float32), (len(overlay.vertices), 4))
-        shader = _surface_shader()
-        buffer = gpu.types.GPUVertBuf(shader.format_calc(), len(overlay.vertices))
+        layout = gpu.types.GPUVertFormat()
+        layout.attr_add(id="pos", comp_type="F32", len=3, fetch_mode="FLOAT")
+        layout.attr_add(id="color", comp_type="F32", len=4, fetch_mode="FLOAT")
+        buffer = gpu.types.GPUVertBuf(layout, len(overlay.vertices))
         buffer.attr_fill("pos", np.ascontiguousarray(overlay.vertices, np.float32))
         buffer.attr_fill("color", np.ascontiguousarray(colors, np.float32))
         index = gpu.types.GPUIndexBuf(type="TRIS", seq=np.ascontiguousarray(overlay.faces, np.uint32))

@@ -16,7 +16,7 @@ _STREAM = (
     ("import_mesh.esopm", "Stream Import", "IMPORT"),
 )
 _OVERLAYS = (
-    ("weights", "object.eso_weights_show", "Weights", "COLORSET_10_VEC"),
+    ("weights", "object.eso_weights_show", "Weights", "VPAINT_HLT"),
     ("edges", "object.eso_edges_show", "Edges", "MOD_EDGESPLIT"),
     ("deviation", "object.eso_deviation_show", "Deviation", "DRIVER_DISTANCE"),
 )
@@ -111,6 +111,19 @@ class VIEW3D_PT_eso_levels(_SidebarPanel, bpy.types.Panel):
                 _draw_button(context, layout, operator, text, icon, "", scale=1.0)
 
 
+class VIEW3D_PT_eso_places(_SidebarPanel, bpy.types.Panel):
+    """Which meshes get levels, and where they go."""
+
+    bl_label = "Meshes and Places"
+    bl_parent_id = "VIEW3D_PT_eso_levels"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw the options of the levels that are seldom changed."""
+        self.layout.use_property_split, self.layout.use_property_decorate = True, False
+        context.scene.eso_lod.draw_places(self.layout)
+
+
 class VIEW3D_PT_eso_weights(_SidebarPanel, bpy.types.Panel):
     """How the engine works."""
 
@@ -147,6 +160,11 @@ class VIEW3D_PT_eso_stream(_SidebarPanel, bpy.types.Panel):
     bl_label = "Stream"
     bl_options = {"DEFAULT_CLOSED"}
 
+    @classmethod
+    def poll(cls, _context: bpy.types.Context) -> bool:
+        """Stay away where streams cannot be written."""
+        return any(_exists(operator) for operator, _, _ in _STREAM)
+
     def draw(self, _context: bpy.types.Context) -> None:
         """Draw the buttons."""
         for operator, text, icon in _STREAM:
@@ -177,6 +195,7 @@ _PANELS = (
     VIEW3D_PT_eso_keep,
     VIEW3D_PT_eso_weights,
     VIEW3D_PT_eso_levels,
+    VIEW3D_PT_eso_places,
     VIEW3D_PT_eso_measure,
     VIEW3D_PT_eso_stream,
     VIEW3D_PT_eso_last_run,
