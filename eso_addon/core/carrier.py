@@ -13,7 +13,6 @@ from .attributes import AttributeSet, Layer, blended
 from .blocks import Blocks
 from .carry import Places, find_places
 from .edge_data import carried_edges
-from .line_guard import LineGuard
 from .lines import Lines
 from .mesh import Bools, Floats, Ints
 from .prepare import Prepared
@@ -50,30 +49,27 @@ class Carrier:
     attributes : AttributeSet
     lines : Lines
     locked : ndarray, (engine's vertices,) bool
-    guard : LineGuard, optional
-        The one that the run has.
+
+    Attributes
+    ----------
+    messages : tuple of str
+        What was mended.
     """
 
     def __init__(self, mesh: Prepared, original: tuple[Floats, Ints], attributes: AttributeSet, lines: Lines,
-                 locked: Bools, guard: LineGuard | None = None) -> None:
-        self._mesh, self._attributes, self._lines, self._guard = mesh, attributes, lines, guard
+                 locked: Bools) -> None:
+        self._mesh, self._attributes, self._lines = mesh, attributes, lines
         self._points = np.ascontiguousarray(original[0].take(mesh.source, axis=0).T)
         self._vertex = original[1].ravel().take(lines.corner)  # the input's vertex at each corner
         self._held = locked.copy()
         self._held[lines.edges] = True
+        self.messages = (*attributes.messages, *lines.messages)
 
     def held(self, survivor: Ints, count: int) -> Bools:
         """Tell the level's vertices, (count,) bool, that stand on lines or are locked: a refit must leave them."""
         held = np.zeros(count + 1, bool)
         held[survivor.compress(self._held)] = True  # those that are gone write beyond the end
         return held[:-1]
-
-    def messages(self, faces_left: int) -> tuple[str, ...]:
-        """Say what was mended, and whether a level of so many faces had to cross lines."""
-        released = None if self._guard is None else self._guard.released_at
-        crossed = () if released is None or faces_left >= released else (
-            f"below {released} triangles seams, borders and sharp edges were crossed: nothing else was left to go",)
-        return (*self._attributes.messages, *self._lines.messages, *crossed)
 
     def carry(self, placed: Floats, corners: Ints, face_map: Ints, survivor: Ints) -> Carried:
         """Put everything on a level.

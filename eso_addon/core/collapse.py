@@ -116,8 +116,8 @@ class Lines(Protocol):
     def follow(self, survivor: Ints) -> None:
         """Take note of a batch that was carried out."""
 
-    def release(self, faces_left: int) -> bool:
-        """Give the lines up, where nothing else can go; tell whether that changes anything."""
+    def tolls(self, one: Ints, other: Ints) -> np.ndarray:
+        """Return what the cost of each edge is multiplied by, (e,) float32."""
 
 
 @dataclass
@@ -255,7 +255,7 @@ def collapse_steps(points: Floats, faces: Ints, quadrics: Floats, boundary: Bool
     while state.alive > target:
         batch = _choose(state)
         if batch is None:
-            if fresh and (state.lines is None or not state.lines.release(state.alive)):
+            if fresh:
                 break
             _weigh(state)  # rejected edges may have become possible
             fresh = True
@@ -300,6 +300,8 @@ def _edge_costs(state: _State, one: Ints, other: Ints) -> np.ndarray:
             holds_one, holds_other = _holds(state, one, other)
             at_other[holds_one] = np.inf
             at_one[holds_other] = np.inf
+            if state.lines is not None:
+                return np.minimum(at_one, at_other) * state.lines.tolls(one, other)
         return np.minimum(at_one, at_other)
     costs = optimal_costs(state.quadrics, one, other)
     if state.holding:
@@ -308,6 +310,8 @@ def _edge_costs(state: _State, one: Ints, other: Ints) -> np.ndarray:
         at_one, at_other = endpoint_costs(state.quadrics, state.points, one.take(held), other.take(held))
         holds_one, holds_other = holds_one.take(held), holds_other.take(held)
         costs[held] = np.where(holds_one, np.where(holds_other, np.inf, at_one), at_other)
+        if state.lines is not None:
+            costs *= state.lines.tolls(one, other)
     return costs
 
 

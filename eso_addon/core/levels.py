@@ -99,7 +99,7 @@ def level(mesh: Prepared, record: CollapseRecord, original: Mesh, length: int,
                        fixed=None if carrier is None else carrier.held(merged, len(placed)))
     if carrier is not None:
         carried = carrier.carry(placed, corners, face_map, merged)
-        messages = (*mesh.messages, *carrier.messages(len(corners)))
+        messages = (*mesh.messages, *carrier.messages)
         return SimplifyResult(carried.points, carried.corners.astype(np.int32), carried.vertex_map.astype(np.int32),
                               mesh.face[face_map].astype(np.int32), True, messages, record, original,
                               carried.attributes, carried.edges.astype(np.int32))

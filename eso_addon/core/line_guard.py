@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What lines let the engine do: they are simplified along themselves, never across, and never become one."""
+"""What lines let the engine do: they are simplified along themselves, and cross or become one only at a high toll."""
 
 from __future__ import annotations
 
@@ -7,12 +7,15 @@ import numpy as np
 
 from .mesh import Bools, Ints
 
+_FREE, _ON, _HELD = 0, 1, 2
+
 
 class LineGuard:
     """Holds the vertices of lines to them while edges collapse.
 
-    A vertex on two edges of one line may go along it. Where a line ends, meets another, or changes its kind, the
-    vertex is held. All others may go anywhere; onto a line they leave its vertex where it stands.
+    Vertices on no line may go anywhere; onto a line they leave its vertex where it stands. A vertex on two edges of one
+    line goes along it. Where a line ends, meets another, or changes its kind, what goes along it leaves the vertex
+    where it stands. What would cross from one line to another, or lay two of them together, pays a toll.
 
     Parameters
     ----------
@@ -21,38 +24,43 @@ class LineGuard:
     kinds : ndarray, (s,) uint8
     opened : ndarray, (n,) bool
         Vertices at boundaries: a line is held there.
-
-    Attributes
-    ----------
-    released_at : int or None
-        The faces that were left when nothing more could go without crossing lines, and they were given up.
+    toll : float
+        So many times its cost.
     """
 
-    def __init__(self, edges: Ints, kinds: np.ndarray, opened: Bools) -> None:
-        count = len(opened)
-        self.released_at: int | None = None
-        self._locked = np.zeros(count + 1, bool)
-        self._edges = edges
-        ends = edges.ravel()
-        degree = np.bincount(ends, minlength=count + 1)
-        every, some = np.full(count + 1, 255, np.uint8), np.zeros(count + 1, np.uint8)
-        np.bitwise_and.at(every, ends, np.tile(kinds, 2))
-        np.bitwise_or.at(some, ends, np.tile(kinds, 2))
-        passed = (degree == 2) & (every == some) & ~np.append(opened, False)
-        self._rank = np.where(degree == 0, 0, np.where(passed, 1, 2)).astype(np.int8)
-        self._next = np.full((2, count + 1), -1)
-        self._on = np.flatnonzero(self._rank == 1)
-        order = np.argsort(ends, kind="stable")
-        first = np.searchsorted(ends.take(order), self._on)
-        beyond = edges[::-1].ravel()
-        self._next[0, self._on] = beyond.take(order.take(first))
-        self._next[1, self._on] = beyond.take(order.take(first + 1))
+    def __init__(self, edges: Ints, kinds: np.ndarray, opened: Bools, toll: float) -> None:
+        self._edges, self._kinds, self._toll = edges, kinds, toll
+        self._opened = np.append(opened, False)
+        self._locked = np.zeros(len(opened) + 1, bool)
+        self._rank = np.zeros(len(opened) + 1, np.int8)
+        self._ends = edges[0]
+        self._look()
 
     def lock(self, vertices: Bools) -> None:
         """Keep these vertices, (n,) bool, where they are, whatever happens."""
         self._locked[:-1] |= vertices
-        self._rank[self._locked] = 2
-        self._on = self._on.compress(self._rank.take(self._on) == 1)
+        self._rank[self._locked] = _HELD
+
+    def _look(self) -> None:
+        """Find out what each vertex is to the lines."""
+        count = len(self._rank)
+        ends = self._edges.ravel()
+        self._rank[self._ends] = _FREE
+        self._rank[ends] = _HELD
+        order = np.sort((ends << 32) | np.arange(len(ends)))
+        order &= (1 << 32) - 1
+        sorted_ends = ends.take(order)
+        first = np.flatnonzero(np.diff(sorted_ends, prepend=-1))
+        passed = first[np.diff(first, append=len(ends)) == 2]
+        kinds = np.tile(self._kinds, 2)
+        vertex = sorted_ends.take(passed)
+        passed = passed[(kinds.take(order.take(passed)) == kinds.take(order.take(passed + 1)))
+                        & ~self._opened.take(vertex)]
+        self._rank[sorted_ends.take(passed)] = _ON
+        self._rank[self._locked] = _HELD
+        self._keys = np.sort(np.minimum(*self._edges) * count + np.maximum(*self._edges))
+        self._neighbors = self._edges[::-1].ravel().take(order)
+        self._ends = sorted_ends
 
     def holds(self, one: Ints, other: Ints) -> tuple[Bools, Bools]:
         """Tell which end of each edge must stay where it is; where both must, the edge may not go.
@@ -62,19 +70,43 @@ class LineGuard:
         one, other : ndarray, (e,) int64
         """
         first, second = self._rank.take(one), self._rank.take(other)
-        holds_one, holds_other = (first > second) | (first == 2), (second > first) | (second == 2)
-        both = np.flatnonzero((first > 0) & (second > 0))
-        if len(both):
-            a, b = one.take(both), other.take(both)
-            out = both.compress(~(self._leads(a, b) | self._leads(b, a)))
-            holds_one[out] = holds_other[out] = True
+        holds_one, holds_other = first > second, second > first
+        holds_one |= self._locked.take(one)
+        holds_other |= self._locked.take(other)
         return holds_one, holds_other
 
-    def _leads(self, vertex: Ints, onto: Ints) -> Bools:
-        return (self._next[0].take(vertex) == onto) | (self._next[1].take(vertex) == onto)
+    def tolls(self, one: Ints, other: Ints) -> np.ndarray:
+        """Return what the cost of each edge is multiplied by, (e,) float32."""
+        tolls = np.ones(len(one), np.float32)
+        lined = np.flatnonzero((self._rank.take(one) > _FREE) & (self._rank.take(other) > _FREE))
+        tolls[lined[self._offends(one.take(lined), other.take(lined))]] = self._toll
+        return tolls
+
+    def _offends(self, one: Ints, other: Ints) -> Bools:
+        """Tell the edges between lines that do not lead along them, or whose ends have a line neighbour in common."""
+        offends = ~self._joined(one, other)
+        along = np.flatnonzero(~offends)
+        pair, neighbor = self._around(one.take(along))
+        offends[along[pair[self._joined(neighbor, other.take(along.take(pair)))]]] = True
+        return offends
+
+    def _joined(self, one: Ints, other: Ints) -> Bools:
+        """Tell the pairs of vertices that a line edge joins."""
+        if len(self._keys) == 0:
+            return np.zeros(len(one), bool)
+        keys = np.minimum(one, other) * len(self._rank) + np.maximum(one, other)
+        return self._keys.take(np.searchsorted(self._keys, keys).clip(max=len(self._keys) - 1)) == keys
+
+    def _around(self, vertices: Ints) -> tuple[Ints, Ints]:
+        """Return the line neighbours of vertices: which of them, and the neighbour."""
+        begin = np.searchsorted(self._ends, vertices)
+        size = np.searchsorted(self._ends, vertices, side="right") - begin
+        pair = np.repeat(np.arange(len(vertices)), size)
+        place = np.arange(len(pair)) - np.repeat(np.cumsum(size) - size, size) + np.repeat(begin, size)
+        return pair, self._neighbors.take(place)
 
     def clashes(self, survivor: Ints, label: Ints) -> Ints:
-        """Return the collapses of a batch after which two line edges would be one.
+        """Return the collapses of a batch that lay two lines together without a toll, beside the others of it.
 
         Parameters
         ----------
@@ -90,35 +122,21 @@ class LineGuard:
         repeated = ranked[1:][(ranked[1:] == ranked[:-1]) & (ranked[1:] >= 0)]
         if len(repeated) == 0:
             return repeated
-        edges = self._edges.compress(np.isin(keys, repeated), axis=1)
-        gone = survivor.take(edges) != edges
-        dearest = np.where(gone, label.take(edges), -1).max(axis=0)
-        return np.unique(dearest[dearest >= 0])
+        ends = np.unique(self._edges.compress(np.isin(keys, repeated), axis=1))
+        gone = ends[survivor.take(ends) != ends]
+        gone = gone[~self._offends(gone, survivor.take(gone))]
+        return np.unique(label.take(gone))
 
     def follow(self, survivor: Ints) -> None:
         """Take note of a batch that was carried out; arguments as of `clashes`."""
-        before, on = self._edges, self._on
-        self._edges = survivor.take(before)
-        self._edges = self._edges.compress(self._edges[0] != self._edges[1], axis=1)
-        if len(on) == 0:
+        if len(self._edges[0]) == 0:
             return
-        kept = survivor.take(on)
-        ahead = survivor.take(self._next.take(on, axis=1))
-        self._next[:, on] = ahead
-        gone = np.flatnonzero(kept != on)
-        self._on = on.compress(kept == on)
-        # of a vertex that went, the neighbour on its other side is now one of the vertex that stays
-        onto = kept.take(gone)
-        further = np.where(ahead[0].take(gone) == onto, ahead[1].take(gone), ahead[0].take(gone))
-        row = (self._next[1].take(onto) == onto).astype(np.int64)
-        along = np.flatnonzero(self._rank.take(onto) == 1)
-        self._next[row.take(along), onto.take(along)] = further.take(along)
-
-    def release(self, faces_left: int) -> bool:
-        """Give the lines up, so that only locked vertices are held; tell whether that changes anything."""
-        if self.released_at is not None or not (self._rank[~self._locked] > 0).any():
-            return False
-        self.released_at = faces_left
-        self._rank = np.where(self._locked, 2, 0).astype(np.int8)
-        self._edges, self._on = self._edges[:, :0], self._on[:0]
-        return True
+        start, end = survivor.take(self._edges)
+        keys = np.minimum(start, end) * len(survivor) + np.maximum(start, end)
+        keys[start == end] = -1
+        keys, number = np.unique(keys, return_inverse=True)
+        kinds = np.zeros(len(keys), np.uint8)
+        np.bitwise_or.at(kinds, number, self._kinds)
+        there = keys >= 0
+        self._kinds, self._edges = kinds[there], np.stack(np.divmod(keys[there], len(survivor)))
+        self._look()

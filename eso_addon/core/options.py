@@ -61,6 +61,8 @@ class Options:
         (simplified along themselves, never across), "locked" (not touched) or "ignored".
     line_weight : float
         Weight of the quadrics that hold lines in their place.
+    line_toll : float
+        A collapse that crosses from one line to another, or lays two together, costs so many times as much.
     locked : array_like, (n,) bool, optional
         Vertices that neither go nor move.
     importance : array_like, (n,) float, optional
@@ -93,6 +95,7 @@ class Options:
     sharp_lines: str = "kept"
     boundary_lines: str = "kept"
     line_weight: float = 10.0
+    line_toll: float = 100.0
     locked: ArrayLike | None = None
     importance: ArrayLike | None = None
     threads: int | None = None
@@ -112,6 +115,7 @@ class Options:
         number("spread", self.spread, 1, np.inf)
         number("prune", self.prune, 0, np.inf)
         number("line_weight", self.line_weight, 0, 1e6)
+        number("line_toll", self.line_toll, 1, 1e6)
         for name in ("seam_lines", "material_lines", "sharp_lines", "boundary_lines"):
             if getattr(self, name) not in LINES:
                 raise MeshError(f"{name} is {getattr(self, name)!r}: choose one of {', '.join(LINES)}")
