@@ -43,6 +43,10 @@ class Model(Protocol):
         """How many objects show each part."""
 
     @property
+    def carried(self) -> list[dict[str, Any]]:
+        """What each part carries, as options of the engine."""
+
+    @property
     def left_behind(self) -> list[str]:
         """What simplified versions lose."""
 
@@ -60,6 +64,7 @@ class OffModel:
 
     left_behind: list[str] = []
     copies = [1]
+    carried: list[dict[str, Any]] = [{}]
 
     def __init__(self, path: Path) -> None:
         from .files.off import FileFormatError, read_off
@@ -264,7 +269,9 @@ def _simplify(args: argparse.Namespace) -> None:
     model = _open(args.input, args.output)
     started = time.perf_counter()
     if args.epsilon is not None:
-        results = [_simplify_to_epsilon(part, {**options, "epsilon": args.epsilon}) for part in model.parts]
+        options["epsilon"] = args.epsilon
+        pairs = zip(model.parts, model.carried, strict=True)
+        results = [_simplify_to_epsilon(part, {**options, **carried}) for part, carried in pairs]
     else:
         kind, value = _target({"ratio": args.ratio, "budget": args.faces, "error": args.max_error})
         chains = make_chains(model, LodSettings(kind, [value], {}, options, True, [], ""))

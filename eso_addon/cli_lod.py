@@ -78,13 +78,14 @@ def make_chains(model: Any, settings: Any) -> list[Chain]:  # noqa: ANN401 - a M
     """Run the engine on each mesh of a file; an error names the mesh."""
     from .core.chains import chains_steps
 
-    goals, engine = settings.goals(), settings.options()
+    goals = settings.goals()
+    options = [settings.options(carried) for carried in model.carried]
     if goals.kind == "budget":
-        return _run_to_end(chains_steps([part[1:] for part in model.parts], goals, engine, model.copies))
+        return _run_to_end(chains_steps([part[1:] for part in model.parts], goals, options, model.copies))
     chains = []
-    for name, *mesh in model.parts:
+    for (name, *mesh), own in zip(model.parts, options, strict=True):
         try:
-            chains += _run_to_end(chains_steps([tuple(mesh)], goals, engine))
+            chains += _run_to_end(chains_steps([tuple(mesh)], goals, [own]))
         except ValueError as error:
             raise ValueError(f"{name}: {error}") from error
     return chains

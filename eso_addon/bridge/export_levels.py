@@ -2,7 +2,7 @@
 """Levels in a file, named and laid out as an engine wants them."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -78,8 +78,8 @@ def export_levels(path: Path, groups: Sequence[LevelGroup], layout: str, write: 
         raise MeshError("there are no levels to write: generate some first")
     names = {obj: name for group in groups for obj, name in [*group.levels.items(), *group.hulls.items()]}
     parents = {obj: _upper(obj) for obj in names if obj.parent is not None and obj.parent.type == "MESH"}
-    empties = _lod_groups(groups) if layout == "lod_group" and path.suffix.lower() == ".fbx" else nullcontext({})
-    with empties as children, _marked(groups, layout):
+    grouped = groups if layout == "lod_group" and path.suffix.lower() == ".fbx" else []
+    with _lod_groups(grouped) as children, _marked(groups, layout):
         names |= {empty: base for empty, (base, _) in children.items()}
         parents |= {level: empty for empty, (_, levels) in children.items() for level in levels}
         with staged(path.stem, names, parents), hooked(), atomic_output(path) as draft:

@@ -83,7 +83,7 @@ def read_sources(meshes: Iterable[bpy.types.Object], *, apply_modifiers: bool,
         group.sort(key=_volume, reverse=True)
         live = live_modifiers(group[0], live_types) if apply_modifiers else []
         with switched_off(group[0], live):
-            arrays = read_mesh(group[0], apply_modifiers=apply_modifiers)
+            arrays = read_mesh(group[0], apply_modifiers=apply_modifiers, carry=True)
         if len(arrays.triangles):
             sources.append(LodSource(group, arrays, live))
     return sources

@@ -59,6 +59,8 @@ class SceneFile:
         Each mesh once, with the objects that show it.
     parts : list of (str, (n, 3) float64, (m, 3) int64)
         Name, vertices and triangles of each, in the size that it has in the scene.
+    carried : list of dict
+        What each carries, as options of the engine.
     copies : list of int
         How many objects show each.
     left_behind : list of str
@@ -81,6 +83,7 @@ class SceneFile:
         if not self.sources:
             raise FileFormatError(f"{path.name} has no visible mesh with faces: nothing to work on")
         self.objects = [obj for source in self.sources for obj in source.objects]
+        self.carried = [source.arrays.carried for source in self.sources]
         self.copies = [len(source.objects) for source in self.sources]
         self.parts = [(s.objects[0].name, s.arrays.vertices, s.arrays.triangles) for s in self.sources]
         losses = [(s.objects[0].name, ", ".join(s.arrays.left_behind)) for s in self.sources if s.arrays.left_behind]

@@ -68,7 +68,7 @@ class Chain:
     messages: tuple[str, ...]
 
 
-def chains_steps(meshes: Sequence[Mesh], goals: Goals, options: Options,
+def chains_steps(meshes: Sequence[Mesh], goals: Goals, options: Sequence[Options],
                  copies: Sequence[int] | None = None) -> Generator[float, None, list[Chain]]:
     """Make the levels of several meshes; yields progress from 0 to 1, may be closed at any time.
 
@@ -77,7 +77,8 @@ def chains_steps(meshes: Sequence[Mesh], goals: Goals, options: Options,
     meshes : sequence of (vertices, faces)
         As `simplify` takes them.
     goals : Goals
-    options : Options
+    options : sequence of Options
+        For each mesh its own, since they hold what the mesh carries.
     copies : sequence of int, optional
         How many times each mesh is there: a budget counts every time.
 
@@ -96,8 +97,8 @@ def chains_steps(meshes: Sequence[Mesh], goals: Goals, options: Options,
     if goals.kind == "budget":
         return (yield from _budget_steps(checked, goals, options, copies))
     chains = []
-    for done, mesh in enumerate(checked):
-        chains.append((yield from scaled(_chain_steps(mesh, goals, options),
+    for done, (mesh, own) in enumerate(zip(checked, options, strict=True)):
+        chains.append((yield from scaled(_chain_steps(mesh, goals, own),
                                          lambda part, done=done: (done + part) / len(checked))))
     return chains
 
@@ -123,11 +124,11 @@ def _targets(mesh: Mesh, goals: Goals) -> tuple[list[int], list[float]]:
     return targets_of(len(mesh[1]), ratios, None, errors)
 
 
-def _budget_steps(meshes: list[Mesh], goals: Goals, options: Options,
+def _budget_steps(meshes: list[Mesh], goals: Goals, options: Sequence[Options],
                   copies: Sequence[int] | None) -> Generator[float, None, list[Chain]]:
     recordings: list[Recording] = []
-    for done, mesh in enumerate(meshes):
-        run = scaled(recording_steps(mesh, options, 1),
+    for done, (mesh, own) in enumerate(zip(meshes, options, strict=True)):
+        run = scaled(recording_steps(mesh, own, 1),
                      lambda part, done=done: 0.8 * (done + part) / len(meshes))
         recordings.append((yield from run))
     shares = share_budget(recordings, [int(total) for total in goals.values], copies)

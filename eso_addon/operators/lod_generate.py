@@ -43,7 +43,7 @@ class OBJECT_OT_eso_lod_generate(EngineOperator, LodOptions, bpy.types.Operator)
     def prepare(self, context: bpy.types.Context) -> Steps[list[Chain]]:
         """Read the meshes, and see that their levels will have names and places."""
         self._settings = self.lod_settings()
-        goals, options = self._settings.goals(), self._settings.options()
+        goals = self._settings.goals()
         self._sources = read_sources(
             self._chosen(context), apply_modifiers=self.apply_modifiers, live_types=self._settings.live
         )
@@ -55,6 +55,7 @@ class OBJECT_OT_eso_lod_generate(EngineOperator, LodOptions, bpy.types.Operator)
             everyone, len(goals.values), name, collection=self.collection, replace=self.replace
         )
         meshes = [(source.arrays.vertices, source.arrays.triangles) for source in self._sources]
+        options = [self._settings.options(source.arrays.carried) for source in self._sources]
         return chains_steps(meshes, goals, options, [len(source.objects) for source in self._sources])
 
     def finish(self, context: bpy.types.Context, result: list[Chain]) -> None:

@@ -87,7 +87,7 @@ class OBJECT_OT_eso_lod_update(EngineOperator, bpy.types.Operator):
         chains: list[Chain] = []
         for number, (source, settings) in enumerate(self._sources):
             mesh = source.arrays.vertices, source.arrays.triangles
-            steps = chains_steps([mesh], settings.goals(), settings.options())
+            steps = chains_steps([mesh], settings.goals(), [settings.options(source.arrays.carried)])
             chains += yield from scaled(steps, lambda part, number=number: (number + part) / len(self._sources))
         return chains
 

@@ -62,9 +62,9 @@ class LodSettings:
         """Give the goals of the levels."""
         return Goals(self.kind, list(self.values), Screen(**self.screen))
 
-    def options(self) -> Options:
-        """Give the engine's options."""
-        engine = dict(self.engine)
+    def options(self, carried: Mapping[str, Any]) -> Options:
+        """Give the engine's options for a mesh that carries attributes."""
+        engine = {**self.engine, **carried}
         return options_of(engine.pop("preset", "default"), engine)
 
 

@@ -3,6 +3,7 @@ import bpy
 import numpy as np
 import pytest
 
+from eso_addon.bridge.read_mesh import read_mesh
 from eso_addon.core.simplify import lod_chain
 from tests.bridge.blender_scenes import activate, add_sphere, arrays
 
@@ -21,7 +22,7 @@ generate = bpy.ops.object.eso_lod_generate
 def test_operator_and_api_give_equal_arrays(options: dict, targets: dict) -> None:
     obj = add_sphere()
     assert generate(**options) == {"FINISHED"}
-    levels = lod_chain(*arrays(obj), **targets)
+    levels = lod_chain(*arrays(obj), **targets, **read_mesh(obj, carry=True).carried)
     names = [f"Ball_LOD{number}" for number in range(len(levels))]
     assert [o.name for o in bpy.data.collections["Ball_LODs"].objects] == names
     for name, level in zip(names, levels, strict=True):
