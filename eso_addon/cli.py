@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
+from .cli_batch import add_word as add_batch
 from .cli_lod import add_options as add_lod_options
 from .cli_lod import finish, lod, make_chains, outcome
 from .cli_serve import add_word as add_serve
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
 FORMATS = (".blend", ".fbx", ".glb", ".gltf", ".obj", ".off", ".ply", ".stl")
 METHODS = ("eso", "so", "cf", "qem", "feature")
 ENDING = ".esopm"
-_ENGINE_WORDS = ("method", "rings", "preset", "placement", "prune", "weld")
+_ENGINE_WORDS = ("method", "rings", "preset", "placement", "prune", "weld", "threads")
 
 
 class Model(Protocol):
@@ -110,6 +111,11 @@ def main(argv: Sequence[str] | None = None) -> int:
         args = _parser().parse_args(argv)
     except SystemExit as stop:  # Blender would take it for its own
         return int(stop.code or 0)
+    return carry_out(args)
+
+
+def carry_out(args: argparse.Namespace) -> int:
+    """Run what was read from the command line; give the exit code."""
     try:
         args.run(args)
     except OSError as error:
@@ -137,12 +143,18 @@ def _parser() -> argparse.ArgumentParser:
     targets.add_argument("--epsilon", type=_epsilon, metavar="X",
                          help="method feature: go on until only features are left, those whose weight is below X")
     _add_engine_words(simplify)
-    lod = _add_word(words, "lod", _lod, "write several levels of detail", "IN", "OUT")
+    lod = _add_word(words, "lod", run_lod, "write several levels of detail", "IN", "OUT")
     add_lod_options(lod, _ratio, _count, _length)
     _add_engine_words(lod)
     _add_word(words, "measure", _measure, "say how far a mesh is from another", "ORIGINAL", "SIMPLIFIED")
     _add_stream_words(words)
+    add_batch(words, _add_lod_words, FORMATS)
     return parser
+
+
+def _add_lod_words(batch: argparse.ArgumentParser) -> None:
+    add_lod_options(batch, _ratio, _count, _length, required=False)
+    _add_engine_words(batch)
 
 
 def _add_stream_words(words: Any) -> None:  # noqa: ANN401 - argparse keeps the type to itself
@@ -224,6 +236,7 @@ def _add_engine_words(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--preset", choices=("paper",), help="the equations as the paper prints them")
     parser.add_argument("--placement", choices=("optimal", "endpoint"), help="where a new vertex stands")
     parser.add_argument("--prune", type=_length, metavar="SIZE", help="drop loose parts smaller than this")
+    parser.add_argument("--threads", type=_count, metavar="N", help="of the engine (default: all cores, at most 4)")
     parser.add_argument("--no-weld", dest="weld", action="store_false", help="keep vertices at equal positions apart")
 
 
@@ -291,7 +304,8 @@ def _simplify_to_epsilon(part: "Part", options: dict[str, Any]) -> "SimplifyResu
         raise ValueError(f"{name}: {error}") from error
 
 
-def _lod(args: argparse.Namespace) -> None:
+def run_lod(args: argparse.Namespace) -> None:
+    """Write the levels of one file."""
     lod(args, _open, _engine_options(args))
 
 

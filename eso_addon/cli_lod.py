@@ -35,9 +35,10 @@ class Outcome:
     switch_distance: float | None = None
 
 
-def add_options(lod: argparse.ArgumentParser, ratio: Read, count: Read, length: Read) -> None:
+def add_options(lod: argparse.ArgumentParser, ratio: Read, count: Read, length: Read, *,
+                required: bool = True) -> None:
     """Add what `lod` takes besides the files and the engine's options."""
-    targets = lod.add_mutually_exclusive_group(required=True)
+    targets = lod.add_mutually_exclusive_group(required=required)
     targets.add_argument("--ratios", type=_list_of(ratio), metavar="R,R,…", help="share of triangles at each level")
     targets.add_argument("--faces", type=_list_of(count), metavar="N,N,…",
                          help="triangles at each level, of all meshes together")

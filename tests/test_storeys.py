@@ -19,6 +19,7 @@ BELOW = {
     "jobs": {"core"},
     "settings": {"core"},
     "viewer": {"files"},
+    "farm": {"core", "files"},
     "operators": {"settings", "jobs", "bridge", "files", "progressive", "viewer", "core"},
     "ui": {"operators", "settings"},
 }
@@ -31,6 +32,7 @@ OUTSIDE = {
     "jobs": {*BLENDER},
     "settings": {*BLENDER},
     "viewer": set(),
+    "farm": {"numpy", "dask", "distributed", "psutil"},
     "operators": {"numpy", *BLENDER},
     "ui": {"gpu", "gpu_extras", "blf", "bl_operators", "bl_ui", *BLENDER},
 }
