@@ -80,15 +80,15 @@ def collections_for(source: bpy.types.Object, scene: bpy.types.Scene) -> list[bp
     return editable or [scene.collection]
 
 
-def level_collection(name: str, scene: bpy.types.Scene) -> bpy.types.Collection:
-    """Find the collection of this name in the scene, or add it there."""
+def level_collection(name: str, scene: bpy.types.Scene, *, shown: bool = True) -> bpy.types.Collection:
+    """Find the collection of this name in the scene, or add it there; one that is not to be shown stays outside."""
     known = {collection.name: collection for collection in scene.collection.children_recursive}
     collection = known.get(name) or bpy.data.collections.get((name, None))
     if collection is None:
         collection = bpy.data.collections.new(name)
     if collection.library is not None:
         raise MeshError(f"collection '{name}' is linked from another file: choose another name")
-    if collection.name not in known:
+    if shown and collection.name not in known:
         scene.collection.children.link(collection)
     return collection
 

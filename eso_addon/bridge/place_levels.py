@@ -103,7 +103,9 @@ def place_levels(place: Place, levels: Sequence[LevelMesh], scene: bpy.types.Sce
     -------
     list of bpy.types.Object
     """
-    collection = objects.level_collection(place.collection, scene)
+    # What a scene shows through instances alone has its levels where these find them, and nowhere else.
+    shown = place.source in scene.objects.values()
+    collection = objects.level_collection(place.collection, scene, shown=shown)
     for obj in place.surplus + [obj for number, obj in place.earlier.items() if number >= len(levels)]:
         remove_with_mesh(obj)
     placed = []

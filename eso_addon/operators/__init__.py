@@ -10,6 +10,7 @@ _MODULES = (
     "lod_update",
     "lod_export",
     "lod_hulls",
+    "lod_bake",
     "measure",
     "weights_show",
     "edges_show",

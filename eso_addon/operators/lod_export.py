@@ -24,7 +24,7 @@ _PROFILES = (
 )
 _WHICH = (
     ("SELECTED", "Selected", "Levels of the selected objects, which may be sources or levels"),
-    ("ALL", "All", "All levels in the scene"),
+    ("ALL", "All", "All levels in the file"),
 )
 
 
@@ -109,7 +109,7 @@ class OBJECT_OT_eso_lod_export(bpy.types.Operator):
         return groups, key
 
     def _sources(self, context: bpy.types.Context) -> list[bpy.types.Object]:
-        things = context.scene.objects if self.which == "ALL" else [context.active_object, *context.selected_objects]
+        things = bpy.data.objects if self.which == "ALL" else [context.active_object, *context.selected_objects]
         found = meshes_behind(obj for obj in things if obj is not None)
         return [obj for obj in found if level_info.levels_of(obj)]
 

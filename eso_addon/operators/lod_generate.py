@@ -4,6 +4,7 @@
 import bpy
 
 from ..bridge import level_info, objects
+from ..bridge.instances import instancers, place_instances
 from ..bridge.lod_sources import LodSource, meshes_behind, name_meshes, read_sources, told_of, write_chain
 from ..bridge.place_levels import Place, place_levels, plan_places
 from ..core.chains import Chain, chains_steps
@@ -28,6 +29,7 @@ class OBJECT_OT_eso_lod_generate(EngineOperator, LodOptions, bpy.types.Operator)
     _settings: LodSettings
     _sources: list[LodSource]
     _places: list[Place]
+    _empties: list[bpy.types.Object]
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -44,8 +46,10 @@ class OBJECT_OT_eso_lod_generate(EngineOperator, LodOptions, bpy.types.Operator)
         """Read the meshes, and see that their levels will have names and places."""
         self._settings = self.lod_settings()
         goals = self._settings.goals()
+        chosen = self._chosen(context)
+        self._empties = instancers(chosen)
         self._sources = read_sources(
-            self._chosen(context), apply_modifiers=self.apply_modifiers, live_types=self._settings.live
+            meshes_behind(chosen), apply_modifiers=self.apply_modifiers, live_types=self._settings.live
         )
         if not self._sources:
             raise MeshError("no mesh with faces is chosen: select one, or choose a collection that has some")
@@ -75,15 +79,15 @@ class OBJECT_OT_eso_lod_generate(EngineOperator, LodOptions, bpy.types.Operator)
                     place_of[obj], own, context.scene, modifiers_applied=self.apply_modifiers, live=source.live
                 )
             name_meshes(levels, names)
+        made += place_instances(self._empties, PROFILES[self.profile].scene_name, context.scene)
         objects.select_only(made, context.view_layer)
         objects.join_local_view(made, context.space_data)
         self._tell(context, result)
 
     def _chosen(self, context: bpy.types.Context) -> list[bpy.types.Object]:
         if self.scope == "COLLECTION":
-            return meshes_behind(_collection(context, self.source_collection).all_objects)
-        chosen = [context.active_object, *context.selected_objects]
-        return meshes_behind(obj for obj in chosen if obj is not None)
+            return list(_collection(context, self.source_collection).all_objects)
+        return [obj for obj in (context.active_object, *context.selected_objects) if obj is not None]
 
     def _tell(self, context: bpy.types.Context, chains: list[Chain]) -> None:
         lines = []

@@ -22,8 +22,8 @@ def why_not_update(context: bpy.types.Context) -> str:
     """Say why no levels can be made again; empty if they can."""
     if context.mode != "OBJECT":
         return "Switch to Object Mode first"
-    if not any(level_info.is_level(obj) for obj in context.scene.objects):
-        return "No levels in this scene: generate some first"
+    if not any(level_info.is_level(obj) for obj in bpy.data.objects):
+        return "No levels in this file: generate some first"
     return ""
 
 

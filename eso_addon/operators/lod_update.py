@@ -23,7 +23,7 @@ from .reports import notes_of, tell
 
 _WHICH = (
     ("SELECTED", "Selected", "Levels of the selected objects, which may be sources or levels"),
-    ("ALL", "All", "All levels in the scene"),
+    ("ALL", "All", "All levels in the file"),
 )
 
 
@@ -93,7 +93,7 @@ class OBJECT_OT_eso_lod_update(EngineOperator, bpy.types.Operator):
 
     def _chosen(self, context: bpy.types.Context) -> list[bpy.types.Object]:
         """List the sources whose levels are to be made again."""
-        things = context.scene.objects if self.which == "ALL" else context.selected_objects
+        things = bpy.data.objects if self.which == "ALL" else context.selected_objects
         sources: dict[bpy.types.Object, None] = {}
         for obj in things:
             if level_info.is_level(obj):
