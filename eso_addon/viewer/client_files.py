@@ -9,8 +9,8 @@ FILES = {
     "index.html": "text/html; charset=utf-8",
     **dict.fromkeys(
         ("viewer.js", "panel.js", "style.js", "view.js", "orbit.js", "worker.js", "stream.js", "line.js",
-         "container.js", "mesh.js", "batch.js", "positions.js", "coder.js", "columns.js", "hash.js", "finest.js",
-         "picture.js", "three.module.js", "three.core.js"),
+         "container.js", "mesh.js", "batch.js", "fan.js", "positions.js", "coder.js", "columns.js", "hash.js",
+         "finest.js", "picture.js", "three.module.js", "three.core.js"),
         "text/javascript; charset=utf-8",
     ),
     "three.LICENSE": "text/plain; charset=utf-8",

@@ -13,6 +13,7 @@ export class Model {
     this.fresh = new Int32Array(contexts * symbols);
     this.shared = shared ? new Float64Array(contexts + symbols) : null;
     this.ready = new Uint8Array(contexts);
+    this.met = new Uint8Array(contexts);
     this.start = new Uint16Array(contexts * (symbols + 1));
     this.bucket = new Uint8Array(contexts * BUCKETS);
     this.weight = new Float64Array(symbols);
@@ -46,15 +47,19 @@ export class Model {
   }
 
   learn() {
-    const { contexts, symbols, counts, fresh, shared } = this;
-    for (let c = 0, at = 0; c < contexts; c++) {
-      for (let s = 0; s < symbols; s++, at++) {
-        counts[at] = (counts[at] >> 1) + fresh[at];
-        if (shared) shared[s - c + contexts] += fresh[at];
+    const { contexts, symbols, counts, fresh, shared, ready, met } = this;
+    for (let c = 0; c < contexts; c++) {
+      met[c] |= ready[c];
+      ready[c] = 0;
+      if (met[c] === 0) continue; // nothing to halve yet
+      for (let s = 0, at = c * symbols; s < symbols; s++, at++) {
+        const more = fresh[at];
+        counts[at] = (counts[at] >> 1) + more;
+        if (more === 0) continue;
+        if (shared !== null) shared[s - c + contexts] += more;
+        fresh[at] = 0;
       }
     }
-    fresh.fill(0);
-    this.ready.fill(0);
   }
 }
 
@@ -75,28 +80,62 @@ export class Coder {
     this.bit = 0;
   }
 
-  run(model) {
-    this.model = model;
-    this.lane = 0;
+  /** Read symbols, one for each context, and learn from them. */
+  symbols(model, contexts, count) {
+    const { state, lanes, words } = this;
+    const { ready, bucket, start, fresh, symbols } = model;
+    const out = new Uint8Array(count);
+    let word = this.word;
+    for (let i = 0, lane = 0; i < count; i++) {
+      const context = contexts[i];
+      if (ready[context] === 0) model.prepare(context);
+      let x = state[lane];
+      const slot = x & (SCALE - 1);
+      const row = context * (symbols + 1);
+      let at = row + bucket[context * BUCKETS + (slot >> 4)];
+      while (slot >= start[at + 1]) at++;
+      const low = start[at];
+      x = (Math.imul(start[at + 1] - low, x >>> 12) + slot - low) | 0;
+      if (x >>> 16 === 0) x = (x << 16) | words[word++];
+      state[lane] = x;
+      if (++lane === lanes) lane = 0;
+      out[i] = at - row;
+      fresh[at - context]++;
+    }
+    this.word = word;
+    if (word > words.length) throw new StreamError('The file is damaged: a batch ends too early.');
+    model.learn();
+    return out;
   }
 
-  symbol(context) {
-    const { model, state } = this;
-    if (!model.ready[context]) model.prepare(context);
-    const lane = this.lane;
-    this.lane = lane + 1 === this.lanes ? 0 : lane + 1;
-    let x = state[lane];
-    const slot = x & (SCALE - 1);
-    let s = model.bucket[context * BUCKETS + (slot >> 4)];
-    const start = model.start;
-    let at = context * (model.symbols + 1) + s;
-    while (slot >= start[at + 1]) at++;
-    s = at - context * (model.symbols + 1);
-    x = (Math.imul(start[at + 1] - start[at], x >>> 12) + slot - start[at]) | 0;
-    if (x >>> 16 === 0) x = (x << 16) | this.words[this.word++];
-    state[lane] = x;
-    model.fresh[context * model.symbols + s]++;
-    return s;
+  /** Which places of `degree` are chosen, by a flag for each that is above 0. */
+  flags(model, degree, places) {
+    const { state, lanes, words } = this;
+    const { ready, start, fresh } = model;
+    const chosen = new Int32Array(places + 1);
+    let word = this.word;
+    let k = 0;
+    for (let v = 0, lane = 0; v < places; v++) {
+      const d = degree[v];
+      if (d === 0) continue;
+      const context = d < 20 ? d : 20;
+      if (ready[context] === 0) model.prepare(context);
+      const none = start[3 * context + 1]; // slots of the flag 0
+      let x = state[lane];
+      const slot = x & (SCALE - 1);
+      const flag = (none - 1 - slot) >>> 31;
+      x = flag ? (Math.imul(SCALE - none, x >>> 12) + slot - none) | 0 : (Math.imul(none, x >>> 12) + slot) | 0;
+      if (x >>> 16 === 0) x = (x << 16) | words[word++];
+      state[lane] = x;
+      if (++lane === lanes) lane = 0;
+      fresh[2 * context + flag]++;
+      chosen[k] = v;
+      k += flag;
+    }
+    this.word = word;
+    if (word > words.length) throw new StreamError('The file is damaged: a batch ends too early.');
+    model.learn();
+    return chosen.subarray(0, k);
   }
 
   /** A number of so many plain bits, up to 53. */
@@ -114,29 +153,29 @@ export class Coder {
     return width === 32 ? value >>> 0 : (value & ((1 << width) - 1)) >>> 0;
   }
 
-  /** The number with a sign: a class as a symbol, the bits below it as they are. */
-  number(context) {
-    const c = this.symbol(context);
-    if (c === 0) return 0;
-    const length = Math.max(c >> 1, 1) - 1;
-    const value = this.bits(length + 1);
-    const sign = value % 2 ? -1 : 1;
-    if (c < 2) return sign;
-    return sign * ((2 + (c & 1)) * 2 ** length + Math.floor(value / 2));
-  }
-
-  learn() {
-    this.model.learn();
-    if (this.word > this.words.length) throw new StreamError('The file is damaged: a batch ends too early.');
+  /** Numbers with a sign, one for each context: classes as symbols, the bits below them as they are. */
+  numbers(model, contexts, count) {
+    const classes = this.symbols(model, contexts, count);
+    const out = new Float64Array(count);
+    for (let i = 0; i < count; i++) {
+      const c = classes[i];
+      if (c === 0) continue;
+      const length = c < 2 ? 0 : (c >> 1) - 1;
+      const value = this.bits(length + 1);
+      let magnitude = 1;
+      if (c > 1) magnitude = length < 28 ? ((2 + (c & 1)) << length) + (value >>> 1) : (2 + (c & 1)) * 2 ** length + Math.floor(value / 2);
+      out[i] = value % 2 ? -magnitude : magnitude;
+    }
+    return out;
   }
 }
 
 /** Bits of a whole number below 2 to the 53rd. */
 export const bitLength = (n) => (n < 4294967296 ? 32 - Math.clz32(n) : 64 - Math.clz32(n / 4294967296));
 
-/** The class of a size, at most 71. */
+/** The class of a size below 2 to the 31st. */
 export function sizeClass(n) {
   if (n < 2) return n;
-  const length = bitLength(n);
-  return Math.min(2 * length - 4 + Math.floor(n / 2 ** (length - 2)), 71);
+  const length = 32 - Math.clz32(n);
+  return 2 * length - 4 + (n >> (length - 2));
 }

@@ -4,10 +4,9 @@ import { Sha256 } from './hash.js';
 
 /** The mesh as it is now: { vertices, faces, edges, attributes: [{domain, name, bytes}] }, as in Python. */
 export function finest(mesh) {
-  const { head, wedgeVertex } = mesh;
-  const faces = new Int32Array(3 * (head.extra + mesh.faceCount));
+  const { wedgeVertex } = mesh;
   const entries = cornerWedges(mesh);
-  for (let i = 0; i < faces.length; i++) faces[i] = wedgeVertex ? wedgeVertex[entries[i]] : entries[i];
+  const faces = wedgeVertex ? entries.map((wedge) => wedgeVertex[wedge]) : entries.slice();
   let vertices = mesh.positions.slice(0, 3 * mesh.places);
   if (wedgeVertex) {
     vertices = new Float32Array(3 * mesh.vertexCount);
@@ -70,35 +69,42 @@ function rowsOf(mesh, { domain, kind, size, width, columns }, entries) {
 export async function digest(mesh) {
   const { vertices, faces, edges, attributes } = finest(mesh);
   const first = new Uint8Array(faces.length / 3);
-  const turned = new Int32Array(faces.length);
   for (let face = 0, at = 0; at < faces.length; face++, at += 3) {
-    const [a, b, c] = [faces[at], faces[at + 1], faces[at + 2]];
-    const row = (first[face] = a <= b && a <= c ? 0 : b <= c ? 1 : 2);
-    turned[at] = row === 0 ? a : row === 1 ? b : c;
-    turned[at + 1] = row === 0 ? b : row === 1 ? c : a;
-    turned[at + 2] = row === 0 ? c : row === 1 ? a : b;
+    const a = faces[at];
+    const b = faces[at + 1];
+    const c = faces[at + 2];
+    if (a <= b && a <= c) continue;
+    const row = (first[face] = b <= c ? 1 : 2);
+    faces[at] = row === 1 ? b : c;
+    faces[at + 1] = row === 1 ? c : a;
+    faces[at + 2] = row === 1 ? a : b;
   }
-  const parts = [vertices, turned, edges];
-  for (const { domain, bytes } of attributes) {
-    if (domain !== 'corner' && domain !== 'side') {
-      parts.push(bytes);
-      continue;
+  const parts = [vertices, faces, edges];
+  for (const { domain, bytes } of attributes) parts.push(domain === 'corner' || domain === 'side' ? turn(bytes, first) : bytes);
+  if (!globalThis.crypto?.subtle) {
+    const sha = new Sha256();
+    for (const part of parts) sha.update(part);
+    return sha.hex();
+  }
+  const whole = new Uint8Array(parts.reduce((sum, part) => sum + part.byteLength, 0));
+  let at = 0;
+  for (const part of parts) {
+    whole.set(new Uint8Array(part.buffer, part.byteOffset, part.byteLength), at);
+    at += part.byteLength;
+  }
+  const hash = new Uint8Array(await crypto.subtle.digest('SHA-256', whole));
+  return Array.from(hash, (byte) => byte.toString(16).padStart(2, '0')).join('');
+}
+
+/** Values of corners, each face's from its `first` on. */
+function turn(bytes, first) {
+  const out = new Uint8Array(bytes.length);
+  const each = first.length ? bytes.length / first.length / 3 : 0;
+  for (let face = 0, at = 0; face < first.length; face++) {
+    for (let row = 0; row < 3; row++) {
+      const from = (3 * face + ((row + first[face]) % 3)) * each;
+      for (let i = 0; i < each; i++) out[at++] = bytes[from + i];
     }
-    const each = bytes.length / faces.length;
-    const out = new Uint8Array(bytes.length);
-    for (let at = 0; at < faces.length; at++) {
-      const face = Math.floor(at / 3);
-      const from = 3 * face + ((at + first[face]) % 3);
-      for (let i = 0; i < each; i++) out[at * each + i] = bytes[from * each + i];
-    }
-    parts.push(out);
   }
-  if (globalThis.crypto?.subtle) {
-    const whole = new Uint8Array(await new Blob(parts).arrayBuffer());
-    const hash = new Uint8Array(await crypto.subtle.digest('SHA-256', whole));
-    return Array.from(hash, (byte) => byte.toString(16).padStart(2, '0')).join('');
-  }
-  const sha = new Sha256();
-  for (const part of parts) sha.update(part);
-  return sha.hex();
+  return out;
 }

@@ -18,8 +18,9 @@ export class Mesh {
     this.wedged = head.needs.includes('wedges');
     this.turned = head.needs.includes('turned') ? new Uint8Array(m) : null;
     const w = this.wedged ? head.wedges : n;
-    this.points = new Int32Array(3 * n); // on the grid of predictions
+    this.points = new Int32Array(4 * n); // on the grid of predictions; the fourth number is for `Fan`
     this.positions = new Float32Array(3 * n);
+    this.positionBits = new Int32Array(this.positions.buffer); // a signalling NaN must keep its bits
     this.faces = new Int32Array(3 * m); // places, face by face
     this.parents = new Int32Array(n).fill(-1);
     this.facesAfter = new Int32Array(n); // faces once each place is there
@@ -33,7 +34,7 @@ export class Mesh {
     this.edges = new Int32Array(2 * head.edges);
     this.attributes = head.attributes.map((entry) => this.attribute(entry, { w, m: m + head.extra }));
     this.plain = !this.wedged && !this.turned && !this.attributes.length; // batches without columns
-    this.connectivity = new Connectivity();
+    this.connectivity = new Connectivity(n);
     this.geometry = new Positions(head.grid);
   }
 
@@ -63,6 +64,7 @@ export class Mesh {
     this.places = places;
     this.faceCount = faces;
     this.facesAfter.fill(faces, 0, places);
+    this.connectivity.base(this.faces, faces);
     this.readPlaces(columns, 0);
     const corners = Int32Array.from({ length: 3 * (this.head.extra + faces) }, (_, at) => at - 3 * this.head.extra);
     this.readWedges(columns, corners);
