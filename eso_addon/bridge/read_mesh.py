@@ -104,9 +104,9 @@ def read_mesh(
         lost = ""
         if keys is not None:
             keys, lost = _evaluated_keys(obj, keys, depsgraph)
-        with _shown_key(obj, 0 if keys is not None else None), _evaluated_mesh(obj, depsgraph) as mesh:
+        with _shown_key(obj, 0 if keys is not None else None), evaluated_mesh(obj, depsgraph) as mesh:
             return _arrays_of(obj, mesh, transform, keys, carry=carry, lost=lost)
-    with _stored_mesh(obj) as mesh:
+    with stored_mesh(obj) as mesh:
         return _arrays_of(obj, mesh, transform, keys, carry=carry)
 
 
@@ -135,7 +135,7 @@ def _evaluated_keys(obj: bpy.types.Object, keys: ShapeKeys,
     """Read shape keys as modifiers leave them; if these do not leave all of them the same vertices, say so."""
     shapes = []
     for number in range(len(keys.names)):
-        with _shown_key(obj, number), _evaluated_mesh(obj, depsgraph) as mesh:
+        with _shown_key(obj, number), evaluated_mesh(obj, depsgraph) as mesh:
             positions = read_attribute(mesh, "position")
             shapes.append(np.zeros((0, 3), np.float32) if positions is None else positions)
     if len({len(shape) for shape in shapes}) > 1:
@@ -174,7 +174,7 @@ def scale_transform(obj: bpy.types.Object) -> NDArray[np.float64]:
 
 
 @contextmanager
-def _evaluated_mesh(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Iterator[bpy.types.Mesh]:
+def evaluated_mesh(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Iterator[bpy.types.Mesh]:
     evaluated = obj.evaluated_get(depsgraph)
     if not evaluated.is_evaluated:
         raise MeshError(
@@ -191,7 +191,7 @@ def _evaluated_mesh(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> It
 
 
 @contextmanager
-def _stored_mesh(obj: bpy.types.Object) -> Iterator[bpy.types.Mesh]:
+def stored_mesh(obj: bpy.types.Object) -> Iterator[bpy.types.Mesh]:
     if not obj.data.is_editmode:
         yield obj.data
         return

@@ -18,9 +18,11 @@ _MODULES = (
     "overlay_hide",
     "level_slide",
     "level_list",
+    "export_esopm",
+    "import_esopm",
 )
 # What else is switched on and off.
-_LISTENERS = ("lifetime", "staleness", "level_slide", "shown")
+_LISTENERS = ("lifetime", "staleness", "level_slide", "shown", "stream_level")
 
 
 def register() -> None:

@@ -71,9 +71,9 @@ class ColumnReader:
 
 def as_words(array: np.ndarray) -> tuple[Ints, int]:
     """Return an array's rows as integers, (rows, columns), and their width in bytes; floats in their order."""
-    rows = len(array)
     width = min(array.dtype.itemsize, 4)
-    words = np.ascontiguousarray(array).reshape(rows, -1).view(f"<u{width}").astype(np.int64)
+    columns = int(np.prod(array.shape[1:], dtype=int)) * array.dtype.itemsize // width
+    words = np.ascontiguousarray(array).ravel().view(f"<u{width}").reshape(len(array), columns).astype(np.int64)
     if array.dtype == np.float32:
         words = np.where(words >> 31, 0xFFFFFFFF - words, words | 0x80000000)
     return words, width

@@ -139,7 +139,7 @@ class _Attempt:
             self._check_openings()
 
     def later(self) -> Bools:
-        """Find the collapses that must wait: the later ones around each that is not clean, and what follows from them."""
+        """Find the collapses that must wait: later ones around each that is not clean, and what follows."""
         count = len(self.new)
         own = np.full(len(self.mesh.points), -1)
         own[self.old] = np.arange(count)

@@ -14,6 +14,7 @@ from .batch_codec import Splits
 from .engine import endpoint_options, lines_of, prepared, run_engine, tangled
 from .estimate import estimated_errors
 from .history import Batch, Unwinding
+from .polygons import is_apart
 from .source import Source, distinct, rows_as_bytes
 
 _ROUNDS = 12
@@ -186,7 +187,7 @@ class _Jumps:
         self._material = np.zeros(len(faces), np.int64) if materials is None else materials.take(faces).astype(np.int64)
         self._marks = np.zeros((3, len(faces)), bool)
         for name, array in named["side"].items():
-            if array.dtype == bool and array.ndim == 2 and not name.startswith("."):
+            if array.dtype == bool and array.ndim == 2 and not is_apart(name):
                 self._marks |= array.ravel().take(faces * 3 + corner)
         # a turned face's sides start one corner later
         turned = corner[1] != 1

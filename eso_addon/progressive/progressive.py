@@ -35,12 +35,15 @@ class Level:
         Loose edges.
     attributes : dict of dict of ndarray
         By domain ("vertex", "corner", "face", "side", "edge") and name.
+    moved : ndarray, (m,) bool
+        Faces that have not yet the corners of the original.
     """
 
     vertices: np.ndarray
     faces: np.ndarray
     edges: np.ndarray
     attributes: Attributes
+    moved: np.ndarray
 
 
 class Progressive:
@@ -148,7 +151,9 @@ class Progressive:
             entry = patches.faces[:, :width]
         else:
             entry = starts.take(patches.faces[:, :width]) + patches.corner_wedge[:, :width]
+        moved = np.zeros(patches.extra.shape[1] + width, bool)
         if wedges < len(patches.wedge_parents):
+            moved[patches.extra.shape[1] :] = (entry >= wedges).any(axis=0)
             entry = _ancestors(patches.wedge_parents, wedges).take(entry)
         extra = starts.take(patches.extra) + patches.extra_wedge
         entry = np.concatenate((extra, entry), axis=1) if extra.size else entry
@@ -160,7 +165,7 @@ class Progressive:
         corners = entry if len(patches.wedge_vertex) == len(patches.places) else patches.wedge_vertex.take(entry)
         seen = int(patches.wedge_vertex[wedges - 1]) + 1 if wedges else 0
         return Level(self._positions[:seen], np.ascontiguousarray(corners.T, np.int32),
-                     patches.edges.astype(np.int32), self._attributes(seen, entry, rows))
+                     patches.edges.astype(np.int32), self._attributes(seen, entry, rows), moved)
 
     @cached_property
     def _positions(self) -> np.ndarray:
@@ -206,7 +211,7 @@ class Progressive:
                     array = array[np.arange(len(array))[:, None], rows]
                 attributes.setdefault(domain, {})[name] = array[orders.get(domain, faces)]
         return Level(level.vertices[orders["vertex"]], number[np.take_along_axis(level.faces, rows, 1)][faces],
-                     edges[orders["edge"]], attributes)
+                     edges[orders["edge"]], attributes, level.moved)
 
     def encoded(self, *, bits: int | None = None, keep_order: bool = False) -> EncodedMesh:
         """Return the mesh's blocks in a file; see `save`."""

@@ -110,7 +110,8 @@ def _attributes(given: Mapping[str, Mapping[str, ArrayLike]], counts: dict[str, 
 
 def rows_as_bytes(named: Mapping[Any, np.ndarray], rows: int) -> np.ndarray:
     """Return all attributes of a domain as (rows, bytes) uint8, side by side."""
-    parts = [np.ascontiguousarray(array).reshape(rows, -1).view(np.uint8).reshape(rows, -1) for array in named.values()]
+    parts = [np.ascontiguousarray(array).ravel().view(np.uint8).reshape(rows, array.nbytes // max(rows, 1))
+             for array in named.values()]
     return np.concatenate([np.zeros((rows, 0), np.uint8), *parts], axis=1)
 
 

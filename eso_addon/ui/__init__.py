@@ -4,15 +4,15 @@
 
 def register() -> None:
     """Add the panels, the menu entries and the overlays."""
-    from . import menus, overlay, panels, presets
+    from . import menus, overlay, panels, presets, stream
 
-    for part in (presets, panels, menus, overlay):
+    for part in (presets, panels, menus, overlay, stream):
         part.register()
 
 
 def unregister() -> None:
     """Take them away again."""
-    from . import menus, overlay, panels, presets
+    from . import menus, overlay, panels, presets, stream
 
-    for part in (overlay, menus, panels, presets):
+    for part in (stream, overlay, menus, panels, presets):
         part.unregister()
