@@ -27,48 +27,6 @@ _HEADERS = {
 }
 
 
-class MeshServer(ThreadingHTTPServer):
-    """Serves one .esopm file under /mesh.esopm and the client under /.
-
-    Parameters
-    ----------
-    path : Path
-        The file; opened anew for every request, so that it may be written again meanwhile.
-    port : int
-        0 for any that is free.
-    host : str
-        The address to listen at.
-
-    Raises
-    ------
-    ValueError
-        The file is no stream, or the port cannot be had.
-    OSError
-        The file cannot be read.
-    """
-
-    daemon_threads = True
-
-    def __init__(self, path: Path, port: int = 0, host: str = "127.0.0.1") -> None:
-        with path.open("rb") as file:
-            if file.read(len(_MAGIC)) != _MAGIC:
-                raise ValueError(f"{path.name} is not an .esopm file: make one with the word stream")
-        self.path = path
-        try:
-            super().__init__((host, port), _Handler)
-        except (OSError, OverflowError) as error:
-            reason = getattr(error, "strerror", None) or str(error)
-            raise ValueError(f"cannot listen at {host}:{port}: {reason}; choose another --port, or none") from None
-
-    @property
-    def url(self) -> str:
-        """The address of the page."""
-        return f"http://{self.server_address[0]!s}:{self.server_address[1]}/"
-
-    def handle_error(self, request: object, client_address: object) -> None:
-        """Say nothing where a visitor went away in the middle."""
-
-
 class _Handler(BaseHTTPRequestHandler):
     server: MeshServer
     server_version = "eso-lod"
@@ -157,6 +115,50 @@ class _Handler(BaseHTTPRequestHandler):
         for name, value in {**_HEADERS, "Cache-Control": "no-cache", **headers}.items():
             self.send_header(name, value)
         self.end_headers()
+
+
+class MeshServer(ThreadingHTTPServer):
+    """Serves one .esopm file under /mesh.esopm and the client under /.
+
+    Parameters
+    ----------
+    path : Path
+        The file; opened anew for every request, so that it may be written again meanwhile.
+    port : int
+        0 for any that is free.
+    host : str
+        The address to listen at.
+
+    Raises
+    ------
+    ValueError
+        The file is no stream, or the port cannot be had.
+    OSError
+        The file cannot be read.
+    """
+
+    daemon_threads = True
+    handler = _Handler
+
+    def __init__(self, path: Path, port: int = 0, host: str = "127.0.0.1") -> None:
+        with path.open("rb") as file:
+            if file.read(len(_MAGIC)) != _MAGIC:
+                raise ValueError(f"{path.name} is not an .esopm file: make one with the word stream")
+        self.path = path
+        try:
+            super().__init__((host, port), self.handler)
+        except (OSError, OverflowError) as error:
+            reason = getattr(error, "strerror", None) or str(error)
+            raise ValueError(f"cannot listen at {host}:{port}: {reason}; choose another --port, or none") from None
+
+    @property
+    def url(self) -> str:
+        """The address of the page."""
+        host = str(self.server_address[0])
+        return f"http://{'localhost' if host in ('0.0.0.0', '::') else host}:{self.server_address[1]}/"
+
+    def handle_error(self, request: object, client_address: object) -> None:
+        """Say nothing where a visitor went away in the middle."""
 
 
 def _copy(source: BufferedIOBase, target: BufferedIOBase, length: int) -> None:

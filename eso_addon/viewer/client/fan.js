@@ -8,6 +8,7 @@ const damaged = (what) => new StreamError(`The file is damaged: ${what}.`);
 
 export class Fan {
   constructor() {
+    this.split = 0;
     this.room(64);
   }
 
@@ -15,6 +16,7 @@ export class Fan {
     this.size = size;
     this.p = new Int32Array(size);
     this.next = new Int32Array(size);
+    this.linked = new Int32Array(size); // where each corner was last found to be a successor
     // the ring's places at p and q of each corner, from the splitting place; twice the offset of their middle
     for (const name of ['px', 'py', 'pz', 'qx', 'qy', 'qz']) this[name] = new Int32Array(size);
     for (const name of ['ox', 'oy', 'oz', 'toward']) this[name] = new Float64Array(size);
@@ -52,10 +54,11 @@ export class Fan {
 
   /**
    * Link each corner to its successor, and fetch the ring. Each place's fourth number tells at which corner it was last
-   * met as p: so no search is needed. Says whether every corner has a successor.
+   * met as p: so no search is needed. Says whether every corner has a successor and is one.
    */
   link(points, corners, first, degree, v, shift) {
-    const { p, next, px, py, pz, qx, qy, qz, ox, oy, oz } = this;
+    const { p, next, linked, px, py, pz, qx, qy, qz, ox, oy, oz } = this;
+    const split = ++this.split;
     const vx = points[v];
     const vy = points[v + 1];
     const vz = points[v + 2];
@@ -85,8 +88,11 @@ export class Fan {
       ox[c] = (px[c] >> shift) + (x >> shift) - cx;
       oy[c] = (py[c] >> shift) + (y >> shift) - cy;
       oz[c] = (pz[c] >> shift) + (z >> shift) - cz;
-      if (met >= 0 && met < degree && p[met] === place) next[c] = met;
-      else {
+      if (met >= 0 && met < degree && p[met] === place) {
+        next[c] = met;
+        if (linked[met] === split) closed = false; // of two corners: then some other is of none
+        linked[met] = split;
+      } else {
         next[c] = -1;
         closed = false;
       }

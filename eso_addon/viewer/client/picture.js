@@ -23,7 +23,7 @@ export class Picture {
     const both = ['corner', 'vertex'];
     this.uv = find(corner, (one) => isUv(one) && active(meta.uv)(one)) ?? find(corner, isUv);
     this.colour = find(both, (one) => isColour(one) && active(meta.color)(one)) ?? find(both, isColour);
-    this.normal = find(both, (one) => /normal/i.test(one.name) && one.kind === 'f' && one.size === 4 && one.components === 3);
+    this.normal = mesh.attributes.find((one) => one.domain === 'corner' && one.name === '.normals' && one.components === 3);
     this.material = find(['face'], (one) => one.name === 'material_index' && one.columns.length === 1);
     this.flat = find(['face'], (one) => one.name === 'sharp_face' && one.columns.length === 1);
     this.faceColumns = [this.material, this.flat].map((one) => one?.columns[0]);
