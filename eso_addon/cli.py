@@ -13,6 +13,8 @@ from .cli_batch import add_word as add_batch
 from .cli_lod import add_options as add_lod_options
 from .cli_lod import finish, lod, make_chains, outcome
 from .cli_serve import add_word as add_serve
+from .cli_stream import add_words as add_stream
+from .cli_stream import stream_path
 from .settings.profiles import Profile
 
 if TYPE_CHECKING:
@@ -22,13 +24,11 @@ if TYPE_CHECKING:
     from .core.chains import Chain
     from .core.deviation import Deviation
     from .core.levels import SimplifyResult
-    from .progressive.progressive import Level
 
     Part = tuple[str, NDArray[np.float64], NDArray[np.int64]]
 
 FORMATS = (".blend", ".fbx", ".glb", ".gltf", ".obj", ".off", ".ply", ".stl")
 METHODS = ("eso", "so", "cf", "qem", "feature")
-ENDING = ".esopm"
 _ENGINE_WORDS = ("method", "rings", "preset", "placement", "prune", "weld", "threads")
 
 
@@ -147,7 +147,8 @@ def _parser() -> argparse.ArgumentParser:
     add_lod_options(lod, _ratio, _count, _length)
     _add_engine_words(lod)
     _add_word(words, "measure", _measure, "say how far a mesh is from another", "ORIGINAL", "SIMPLIFIED")
-    _add_stream_words(words)
+    add_stream(words, _path, FORMATS, METHODS)
+    add_serve(words, stream_path)
     add_batch(words, _add_lod_words, FORMATS)
     return parser
 
@@ -155,61 +156,6 @@ def _parser() -> argparse.ArgumentParser:
 def _add_lod_words(batch: argparse.ArgumentParser) -> None:
     add_lod_options(batch, _ratio, _count, _length, required=False)
     _add_engine_words(batch)
-
-
-def _add_stream_words(words: Any) -> None:  # noqa: ANN401 - argparse keeps the type to itself
-    stream = words.add_parser("stream", help="write a progressive stream", description="Write a progressive stream.")
-    stream.set_defaults(run=_stream)
-    stream.add_argument("input", type=_path, metavar="IN", help=f"one of {' '.join(FORMATS)}")
-    stream.add_argument("output", type=_stream_path, metavar="OUT", help=f"a {ENDING} file")
-    stream.add_argument("--bits", type=_count, metavar="N", help="bits of a coordinate, 10 to 20; lossless without")
-    stream.add_argument("--keep-order", action="store_true", help="keep the order of vertices and faces")
-    stream.add_argument("--method", choices=METHODS, default="eso", help="how vertices are weighted")
-    restore = words.add_parser("restore", help="write a level of a stream", description="Write a level of a stream.")
-    restore.set_defaults(run=_restore)
-    restore.add_argument("input", type=_stream_path, metavar="IN", help=f"a {ENDING} file")
-    restore.add_argument("output", type=_path, metavar="OUT", help=f"one of {' '.join(FORMATS)}")
-    limits = restore.add_mutually_exclusive_group()
-    limits.add_argument("--faces", type=_count, metavar="N", help="triangles at most; the original without")
-    limits.add_argument("--bytes", type=_count, metavar="N", help="use so many bytes of the file")
-    restore.add_argument("--partial", action="store_true", help="of a damaged file, write what is good")
-    info = words.add_parser("info", help="say what a stream holds", description="Say what a stream holds.")
-    info.set_defaults(run=_info)
-    info.add_argument("input", type=_stream_path, metavar="IN", help=f"a {ENDING} file")
-    add_serve(words, _stream_path)
-
-
-def _stream_path(word: str) -> Path:
-    if Path(word).suffix.lower() != ENDING:
-        raise argparse.ArgumentTypeError(f"{word} must end in {ENDING}")
-    return Path(word)
-
-
-def _stream(args: argparse.Namespace) -> None:
-    from .cli_stream import stream
-
-    stream(args, _triangles, {"method": args.method})
-
-
-def _restore(args: argparse.Namespace) -> None:
-    from .cli_stream import restore
-
-    restore(args, _write_level)
-
-
-def _info(args: argparse.Namespace) -> None:
-    from .cli_stream import info
-
-    info(args)
-
-
-def _write_level(path: Path, level: "Level") -> None:
-    from .files.off import write_off
-
-    if path.suffix.lower() == ".off":
-        write_off(path, level.vertices.astype(float), level.faces)
-    else:
-        _scene_files().write_triangles(path, level.vertices, level.faces)
 
 
 def _add_word(

@@ -4,59 +4,197 @@
 from __future__ import annotations
 
 import argparse
+import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
     from .progressive.progressive import Level
-
-    Triangles = Callable[[Path], tuple[NDArray[np.float64], NDArray[np.int64]]]
+    from .progressive.scene import Scene
 
 ENDING = ".esopm"
 
 
-def stream(args: argparse.Namespace, triangles: Triangles, options: dict[str, Any]) -> None:
-    """Write a file's visible meshes as one progressive stream."""
-    from .progressive.progressive import progressive
+def add_words(words: Any, mesh_path: Callable[[str], Path], formats: Sequence[str],  # noqa: ANN401 - argparse's own
+              methods: Sequence[str]) -> None:
+    """Add the words to the parser; `mesh_path` reads the name of a mesh file."""
+    one_of = f"one of {' '.join(formats)}"
+    stream = words.add_parser("stream", help="write a progressive stream",
+                              description="Write all visible meshes of a file as one progressive stream.")
+    stream.set_defaults(run=_stream)
+    stream.add_argument("input", type=mesh_path, metavar="IN", help=one_of)
+    stream.add_argument("output", type=stream_path, metavar="OUT", help=f"a {ENDING} file")
+    stream.add_argument("--method", choices=methods, help="which edges go first (default: qem)")
+    stream.add_argument("--epsilon", type=_epsilon, metavar="X",
+                        help="for the method feature: hold edges whose virtual edge weighs less, from -1 to 1")
+    stream.add_argument("--bits", type=_bits, metavar="N", help="bits of a coordinate, 4 to 24; lossless without")
+    stream.add_argument("--keep-order", action="store_true", help="keep the order of vertices and faces")
+    restore = words.add_parser("restore", help="write a level of a stream",
+                               description="Write the original of a stream, or a level of it.")
+    restore.set_defaults(run=_restore)
+    restore.add_argument("input", type=stream_path, metavar="IN", help=f"a {ENDING} file")
+    restore.add_argument("output", type=mesh_path, metavar="OUT", help=f"{one_of}; exact in .blend, .glb and .ply")
+    limits = restore.add_mutually_exclusive_group()
+    limits.add_argument("--faces", type=_count, metavar="N", help="triangles at most, of all meshes together")
+    limits.add_argument("--bytes", type=_count, metavar="N", help="use so many bytes of the file")
+    restore.add_argument("--partial", action="store_true", help="of a damaged file, write what is good")
+    info = words.add_parser("info", help="say what a stream holds", description="Say what a stream holds.")
+    info.set_defaults(run=_info)
+    info.add_argument("input", type=stream_path, metavar="IN", help=f"a {ENDING} file")
 
-    vertices, faces = triangles(args.input)
+
+def stream_path(word: str) -> Path:
+    """Read the name of a stream."""
+    if Path(word).suffix.lower() != ENDING:
+        raise argparse.ArgumentTypeError(f"{word} must end in {ENDING}")
+    return Path(word)
+
+
+def _whole(word: str, least: int, most: float) -> int:
+    try:
+        if least <= int(word) <= most:
+            return int(word)
+    except ValueError:
+        pass
+    span = f"{least} or more" if most == float("inf") else f"from {least} to {most}"
+    raise argparse.ArgumentTypeError(f"{word} is not a whole number, {span}")
+
+
+def _count(word: str) -> int:
+    return _whole(word, 1, float("inf"))
+
+
+def _bits(word: str) -> int:
+    return _whole(word, 4, 24)
+
+
+def _epsilon(word: str) -> float:
+    try:
+        if -1 <= float(word) <= 1:
+            return float(word)
+    except ValueError:
+        pass
+    raise argparse.ArgumentTypeError(f"{word} is not a number from -1 to 1")
+
+
+def _stream(args: argparse.Namespace) -> None:
+    if args.epsilon is not None and args.method not in (None, "feature"):
+        raise ValueError("--epsilon belongs to the method feature: leave out one of them")
+    options = {} if args.method is None else {"method": args.method}
+    if args.epsilon is not None:
+        options = {"method": "feature", "epsilon": args.epsilon}
+    read = _read_off if args.input.suffix.lower() == ".off" else _read_scene
+    make, notes = read(args.input, args.keep_order)
     started = time.perf_counter()
-    mesh = progressive(vertices, faces, meta={"name": args.input.stem}, **options)
-    size = mesh.save(args.output, bits=args.bits, keep_order=args.keep_order)
+    scene = make(options)
+    size = scene.save(args.output, bits=args.bits, keep_order=args.keep_order)
     seconds = time.perf_counter() - started
-    per_vertex = size / max(mesh.vertex_count, 1)
-    print(f"{args.input.stem}: {mesh.face_count} triangles, base of {mesh.base_faces}, {mesh.batches} batches, "
-          f"{size} bytes, {per_vertex:.2f} a vertex")
-    print(f"{args.output} written, {seconds:.2f} s of work")
+    vertices = sum(mesh.vertex_count for mesh in scene.meshes)
+    for note in notes:
+        print(note, file=sys.stderr)
+    for name, mesh in _named(scene):
+        print(f"{name}: {mesh.face_count} triangles, base of {mesh.base_faces}, {mesh.batches} batches")
+    print(f"{args.output} written: {size} bytes, {size / max(vertices, 1):.2f} a vertex, {seconds:.2f} s of work")
 
 
-def restore(args: argparse.Namespace, write: Callable[[Path, Level], None]) -> None:
-    """Write a level of a stream, or the original."""
-    from .progressive.progressive import load_progressive
-
-    mesh = load_progressive(args.input, partial=args.partial, max_bytes=args.bytes)
-    level = mesh.restore() if args.faces is None else mesh.at(faces=args.faces)
-    write(args.output, level)
-    if mesh.damage and args.bytes is None:
-        print(mesh.damage)
-    print(f"{args.output} written: {len(level.faces)} triangles, {len(level.vertices)} vertices")
+def _named(scene: Scene) -> list[tuple[str, Any]]:
+    """Return each mesh with the names of its objects."""
+    names: dict[int, list[str]] = {}
+    for entry in scene.meta.get("objects", []):
+        names.setdefault(entry["mesh"], []).append(entry["name"])
+    return [(", ".join(names.get(number, [f"mesh {number + 1}"])), mesh) for number, mesh in enumerate(scene.meshes)]
 
 
-def info(args: argparse.Namespace) -> None:
-    """Say what a stream holds."""
-    from .progressive.progressive import load_progressive
+def _read_off(path: Path, _keep_order: bool) -> tuple[Callable[[dict[str, Any]], Scene], list[str]]:
+    """Read an .off file: no Blender needed."""
+    import numpy as np
 
-    mesh = load_progressive(args.input, partial=True)
-    print(f"{args.input.name}: {mesh.face_count} triangles, {mesh.vertex_count} vertices, "
-          f"base of {mesh.base_faces}, {mesh.batches} batches, {args.input.stat().st_size} bytes")
-    for domain, names in mesh.attribute_names.items():
-        print(f"{domain} attributes: {', '.join(names)}")
-    for key, value in mesh.meta.items():
-        print(f"{key}: {value}")
-    if mesh.damage:
-        print(mesh.damage)
+    from .files.off import read_off
+    from .progressive.progressive import progressive
+    from .progressive.scene import Scene
+
+    vertices, faces = read_off(path)
+
+    def make(options: dict[str, Any]) -> Scene:
+        mesh = progressive(vertices, faces, meta={"name": path.stem}, **options)
+        entry = {"name": path.stem, "mesh": 0, "matrix": np.eye(4).ravel().tolist()}
+        return Scene([mesh], {"objects": [entry]})
+
+    return make, []
+
+
+def _read_scene(path: Path, keep_order: bool) -> tuple[Callable[[dict[str, Any]], Scene], list[str]]:
+    """Read a file through Blender."""
+    from .bridge.stream_files import read_stream_objects
+    from .bridge.stream_objects import stream_steps
+
+    meshes, meta = read_stream_objects(path, keep_order=keep_order)
+
+    def make(options: dict[str, Any]) -> Scene:
+        steps = stream_steps(meshes, meta, options)
+        while True:
+            try:
+                next(steps)
+            except StopIteration as end:
+                return end.value
+
+    lost = sorted({name for mesh in meshes for name in mesh.left_behind})
+    return make, [f"{path.name}: not carried: {', '.join(lost)}"] if lost else []
+
+
+def _restore(args: argparse.Namespace) -> None:
+    from .progressive.scene import load_scene
+
+    scene = load_scene(args.input, partial=args.partial, max_bytes=args.bytes)
+    levels = scene.levels(faces=args.faces)
+    if args.output.suffix.lower() == ".off":
+        _write_off(args.output, scene, levels)
+    else:
+        from .bridge.stream_files import write_levels
+
+        write_levels(args.output, scene, levels)
+    if scene.damage and args.bytes is None:
+        print(scene.damage, file=sys.stderr)
+    print(f"{args.output} written: {sum(len(level.faces) for level in levels)} triangles, "
+          f"{sum(len(level.vertices) for level in levels)} vertices")
+
+
+def _write_off(path: Path, scene: Scene, levels: list[Level]) -> None:
+    """Write all objects as one mesh, where they stand in the scene."""
+    import numpy as np
+
+    from .files.off import write_off
+
+    entries = scene.meta.get("objects") or [{"mesh": number, "matrix": np.eye(4).ravel()}
+                                            for number in range(len(levels))]
+    vertices, faces, count = [], [], 0
+    for entry in entries:
+        level, matrix = levels[entry["mesh"]], np.array(entry["matrix"], np.float64).reshape(4, 4)
+        points = level.vertices.astype(np.float64)
+        if not np.array_equal(matrix, np.eye(4)):
+            points = points @ matrix[:3, :3].T + matrix[:3, 3]
+        vertices.append(points)
+        faces.append(level.faces.astype(np.int64) + count)
+        count += len(points)
+    write_off(path, np.concatenate(vertices), np.concatenate(faces))
+
+
+def _info(args: argparse.Namespace) -> None:
+    from .progressive.scene import load_scene
+
+    scene = load_scene(args.input, partial=True)
+    vertices = sum(mesh.vertex_count for mesh in scene.meshes)
+    print(f"{args.input.name}: {scene.face_count} triangles, {vertices} vertices, {args.input.stat().st_size} bytes")
+    for name, mesh in _named(scene):
+        print(f"{name}: {mesh.face_count} triangles, {mesh.vertex_count} vertices, base of {mesh.base_faces}, "
+              f"{mesh.batches} batches, error of the base {mesh.batch_errors[0]:.3g}")
+        for domain, names in mesh.attribute_names.items():
+            print(f"  {domain} attributes: {', '.join(names)}")
+    for key in ("objects", "materials"):
+        entries = scene.meta.get(key)
+        if isinstance(entries, list) and entries:
+            print(f"{key}: {', '.join(str(entry.get('name')) for entry in entries if isinstance(entry, dict))}")
+    if scene.damage:
+        print(scene.damage)

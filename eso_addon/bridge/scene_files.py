@@ -79,7 +79,7 @@ class SceneFile:
             pass  # says why a file cannot be opened better than Blender does
         with quiet(f"cannot read {path.name}"):
             READERS[path.suffix.lower()](path)
-            self.sources = read_sources(_visible_meshes(), apply_modifiers=True, live_types=_LIVE)
+            self.sources = read_sources(visible_meshes(), apply_modifiers=True, live_types=_LIVE)
         if not self.sources:
             raise FileFormatError(f"{path.name} has no visible mesh with faces: nothing to work on")
         self.objects = [obj for source in self.sources for obj in source.objects]
@@ -230,7 +230,7 @@ def write_triangles(path: Path, vertices: NDArray[np.float32], faces: NDArray[np
     faces : (m, 3) int32
     """
     with quiet(f"cannot write {path.name}"):
-        _start_empty()
+        start_empty()
         mesh = bpy.data.meshes.new(path.stem)
         mesh.from_pydata(vertices, (), faces.tolist())
         obj = bpy.data.objects.new(path.stem, mesh)
@@ -267,7 +267,7 @@ def write_scene(path: Path, objects: Sequence[bpy.types.Object]) -> None:
         WRITERS[path.suffix.lower()](draft)
 
 
-def _visible_meshes() -> list[bpy.types.Object]:
+def visible_meshes() -> list[bpy.types.Object]:
     """List what a user sees, less the shapes that stand for bones."""
     bpy.context.view_layer.update()
     scene = bpy.context.scene.objects
@@ -282,7 +282,8 @@ def _joined(objects: Sequence[bpy.types.Object]) -> tuple[NDArray[np.float64], N
     return np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(faces)
 
 
-def _start_empty() -> None:
+def start_empty() -> None:
+    """Open an empty file."""
     # Not read_factory_settings, which would switch this add-on off while it runs.
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
 
@@ -291,7 +292,7 @@ def _import_with(operator: str, **options: object) -> Callable[[Path], None]:
     """Make a reader from the name of one of Blender's import operators."""
 
     def read(path: Path) -> None:
-        _start_empty()
+        start_empty()
         _operator(operator)(filepath=str(path), **options)
 
     return read
@@ -328,7 +329,7 @@ def _write_blend(path: Path) -> None:
 
 def _read_off(path: Path) -> None:
     vertices, faces = read_off(path)
-    _start_empty()
+    start_empty()
     mesh = bpy.data.meshes.new(path.stem)
     mesh.from_pydata(vertices, (), faces.tolist())
     bpy.context.scene.collection.objects.link(bpy.data.objects.new(path.stem, mesh))

@@ -1,4 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
+# Blender reads properties from annotations that are calls:
+# mypy: disable-error-code="valid-type"
 """The level of an imported stream, for afterwards: a property of its objects."""
 
 from collections.abc import Sequence
