@@ -7,6 +7,7 @@ import time
 import traceback
 from collections.abc import Callable, Generator, Iterator
 from pathlib import Path
+from typing import Any
 
 import bpy
 import numpy as np
@@ -31,6 +32,23 @@ def view() -> bpy.types.Area:
 def region(kind: str) -> bpy.types.Region:
     """Give a region of the viewport."""
     return next(region for region in view().regions if region.type == kind)
+
+
+def clear_sidebar() -> Steps:
+    """Scroll the sidebar up and take the mouse out of it."""
+    area = region("UI")
+    for _ in range(10):
+        press("WHEELUPMOUSE", area.x + 60, area.y + area.height // 2)
+    yield 0.2
+    place = region("WINDOW")
+    move(place.x + 120, place.y + place.height - 200)
+    yield 0.4
+
+
+def look_at_object() -> None:
+    """Fill the viewport with what is selected."""
+    with bpy.context.temp_override(window=window(), area=view(), region=region("WINDOW")):
+        bpy.ops.view3d.view_selected()
 
 
 def sidebar(category: str = "ESO") -> Steps:
@@ -110,11 +128,12 @@ def part(image: np.ndarray, area: bpy.types.Region | bpy.types.Area) -> np.ndarr
     return image[height - area.y - area.height : height - area.y, area.x : area.x + area.width]
 
 
-def under_mouse() -> str:
+def under_mouse(kind: str = "UI", editor: str = "VIEW_3D") -> str:
     """Say what the button under the mouse does: `bpy.ops...` or the path of its property."""
     manager = bpy.context.window_manager
-    area = view()
-    with bpy.context.temp_override(window=window(), area=area, region=region("UI")):
+    area = next(area for area in window().screen.areas if area.type == editor)
+    place = next(region for region in area.regions if region.type == kind)
+    with bpy.context.temp_override(window=window(), area=area, region=place):
         for name in ("copy_python_command_button", "copy_data_path_button"):
             manager.clipboard = ""
             try:
@@ -126,29 +145,32 @@ def under_mouse() -> str:
     return ""
 
 
-def find(what: str, found: list[tuple[int, int]], *, x: float = 0.6) -> Steps:
-    """Look for a button in the sidebar from the top down, by what it does; appends where it is to `found`.
+def find(
+    what: str, found: list[tuple[int, int]], *, x: float = 0.6, kind: str = "UI", editor: str = "VIEW_3D"
+) -> Steps:
+    """Look for a button from the top down, by what it does; appends where it is to `found`.
 
-    Where it is not in sight the sidebar is scrolled: up first, then down.
+    Where it is not in sight the region is scrolled: up first, then down.
     """
-    area = region("UI")
-    across, middle = area.x + int((area.width - 20) * x), area.y + area.height // 2
+    area = next(area for area in window().screen.areas if area.type == editor)
+    place = next(region for region in area.regions if region.type == kind)
+    across, middle = place.x + int((place.width - 20) * x), place.y + place.height // 2
     for wheel in ("", "WHEELUPMOUSE", "WHEELDOWNMOUSE", "WHEELDOWNMOUSE"):
         for _ in range(8 if wheel else 0):
             move(across, middle)
             press(wheel, across, middle)
             yield 0.05
-        for y in range(area.y + area.height - 30, area.y + 5, -9):
+        for y in range(place.y + place.height - 10, place.y + 3, -9):
             move(across, y)
             yield 0.06
-            if what in under_mouse():
+            if what in under_mouse(kind, editor):
                 found.append((across, y - 3))
                 return
-    raise AssertionError(f"no button for {what} in the sidebar")
+    raise AssertionError(f"no button for {what} in {editor} {kind}")
 
 
-def press_button(what: str, **where: float) -> Steps:
-    """Find a button in the sidebar and click it."""
+def press_button(what: str, **where: Any) -> Steps:  # noqa: ANN401 - as of `find`
+    """Find a button and click it."""
     found: list[tuple[int, int]] = []
     yield from find(what, found, **where)
     yield from click(*found[0])
@@ -175,6 +197,9 @@ def play(scenes: Iterator[tuple[str, Steps]]) -> None:
                 traceback.print_exc()
                 failed.append(name)
                 picture(f"failed_{name}")
+                for _ in range(3):  # whatever is open
+                    press("ESC", 300, 300)
+                    yield 0.3
             print(f"{'FAILED' if name in failed else 'passed'}  {name}  {time.monotonic() - started:.1f} s", flush=True)
         (OUT / "result.txt").write_text("\n".join(failed) or "ok", encoding="utf-8")
         os._exit(1 if failed else 0)  # no question about unsaved changes

@@ -4,7 +4,10 @@
 # Reads GUI_BLENDER and GUI_OUT. Called by scripts/gui_blender.sh, on this machine or in the Debian it has made.
 set -euo pipefail
 zip=$1 script=$2 size=$3 seconds=$4; shift 4
-export BLENDER_USER_RESOURCES=$GUI_OUT/user
+# A home as people have them: with spaces and letters from elsewhere.
+export HOME="$GUI_OUT/user/häuschen mit Platz 家"
+export BLENDER_USER_RESOURCES="$HOME/blender ファイル"
+mkdir -p "$BLENDER_USER_RESOURCES"
 "$GUI_BLENDER" --command extension install-file -r user_default --enable "$zip"
 if [ -z "${DISPLAY:-}" ]; then
     export LIBGL_ALWAYS_SOFTWARE=1 GALLIUM_DRIVER=llvmpipe DISPLAY=:99
