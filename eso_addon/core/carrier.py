@@ -16,6 +16,7 @@ from .edge_data import carried_edges
 from .lines import Lines
 from .mesh import Bools, Floats, Ints
 from .prepare import Prepared
+from .unflip import areas_of, mapped_by_source, turned_back
 
 
 class Carried(NamedTuple):
@@ -104,8 +105,9 @@ class Carrier:
         carried = {}
         for layer in self._attributes.layers:
             if layer.domain == "corner":
-                values = self._at_wedges(layer, places, self._lines.corner).take(target, axis=0)
-                values[unmoved] = layer.rows.take(self._lines.corner.ravel().take(slot[unmoved]), axis=0)
+                values = self._at_corners(layer, places, slot, unmoved)
+                if layer.kind == "uv":
+                    values = self._turned_back(layer, values, places, slot, there)
             elif layer.domain == "vertex":
                 values = self._at_wedges(layer, places, self._vertex).take(wedge_of, axis=0)
             elif layer.domain == "face":
@@ -117,6 +119,31 @@ class Carrier:
         edges, on_edges = carried_edges(self._attributes, self._points, self._mesh.vertex, self._lines, survivor,
                                         places.vertex.take(wedge_of), parted, placed)
         return Carried(points, parted, vertex_map, {**carried, **on_edges}, edges)
+
+    def _at_corners(self, layer: Layer, places: Places, slot: Ints, unmoved: Bools) -> NDArray:
+        values = self._at_wedges(layer, places, self._lines.corner).take(places.target.ravel().take(slot), axis=0)
+        values[unmoved] = layer.rows.take(self._lines.corner.ravel().take(slot[unmoved]), axis=0)
+        return values
+
+    def _turned_back(self, layer: Layer, values: NDArray, places: Places, slot: Ints, there: Floats) -> NDArray:
+        """Turn back UV triangles that lie the other way round than their source."""
+        faces = places.target.ravel().take(slot).reshape(-1, 3)
+        source = layer.rows.take(self._lines.corner.ravel().take(slot), axis=0).astype(np.float64).reshape(-1, 3, 2)
+        turns = areas_of(source)
+        uv = np.zeros((len(places.vertex), 2))
+        uv[faces.ravel()] = values
+        lined = np.zeros(there.shape[1], bool)
+        lined[places.vertex.take(places.target.ravel().compress(self._held.take(self._lines.faces.ravel())))] = True
+        mended, still = turned_back(uv, faces, turns, ~lined.take(places.vertex))
+        moved = (mended != uv).any(axis=1).take(faces.ravel())
+        values[moved] = mended.take(faces.ravel()[moved], axis=0)
+        if still.any():
+            corners = there.take(places.vertex.take(faces[still]), axis=1).transpose(1, 2, 0)
+            before = self._points.take(self._lines.faces.ravel().take(slot.reshape(-1, 3)[still]), axis=1)
+            values.reshape(-1, 3, 2)[still] = mapped_by_source(corners, before.transpose(1, 2, 0), source[still])
+            over = still & (areas_of(values.reshape(-1, 3, 2)) * turns <= 0)
+            values.reshape(-1, 3, 2)[over] = source[over]  # turned over in space too
+        return values
 
     def _at_wedges(self, layer: Layer, places: Places, elements: Ints) -> NDArray:
         return blended(layer, elements.take(places.face, axis=1), places.weights)

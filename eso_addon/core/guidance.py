@@ -75,7 +75,7 @@ def guidance_of(mesh: Prepared, original: tuple[Floats, Ints], options: Options)
             locked[lines.along(bit)] = True
     guard = None
     if (lines.kinds > 0).any() and options.method != "feature":
-        guard = LineGuard(lines.edges, lines.kinds.compress(lines.kinds > 0), mesh.opened, options.line_toll)
+        guard = LineGuard(lines.edges, mesh.points.shape[1], options.line_toll)
     carrier = Carrier(mesh, original, attributes, lines, locked)
     return Guidance(lines, guard, locked if locked.any() else None, importance, carrier)
 

@@ -7,60 +7,45 @@ import numpy as np
 
 from .mesh import Bools, Ints
 
-_FREE, _ON, _HELD = 0, 1, 2
-
 
 class LineGuard:
     """Holds the vertices of lines to them while edges collapse.
 
-    Vertices on no line may go anywhere; onto a line they leave its vertex where it stands. A vertex on two edges of one
-    line goes along it. Where a line ends, meets another, or changes its kind, what goes along it leaves the vertex
-    where it stands. What would cross from one line to another, or lay two of them together, pays a toll.
+    Vertices on no line may go anywhere, also onto a line; those on lines go along them. What would cross from one line
+    to another, or lay two of them together, pays a toll. The lines' quadrics hold them in their place.
 
     Parameters
     ----------
     edges : ndarray, (2, s) int64
         Vertices of the line edges.
-    kinds : ndarray, (s,) uint8
-    opened : ndarray, (n,) bool
-        Vertices at boundaries: a line is held there.
+    count : int
+        Number of vertices.
     toll : float
         So many times its cost.
     """
 
-    def __init__(self, edges: Ints, kinds: np.ndarray, opened: Bools, toll: float) -> None:
-        self._edges, self._kinds, self._toll = edges, kinds, toll
-        self._opened = np.append(opened, False)
-        self._locked = np.zeros(len(opened) + 1, bool)
-        self._rank = np.zeros(len(opened) + 1, np.int8)
+    def __init__(self, edges: Ints, count: int, toll: float) -> None:
+        self._edges, self._toll = edges, toll
+        self._locked = np.zeros(count + 1, bool)
+        self._lined = np.zeros(count + 1, bool)
         self._ends = edges[0]
         self._look()
 
     def lock(self, vertices: Bools) -> None:
         """Keep these vertices, (n,) bool, where they are, whatever happens."""
         self._locked[:-1] |= vertices
-        self._rank[self._locked] = _HELD
 
     def _look(self) -> None:
-        """Find out what each vertex is to the lines."""
-        count = len(self._rank)
+        """Find out which vertices are on lines, and their neighbours there."""
+        count = len(self._lined)
         ends = self._edges.ravel()
-        self._rank[self._ends] = _FREE
-        self._rank[ends] = _HELD
+        self._lined[self._ends] = False
+        self._lined[ends] = True
         order = np.sort((ends << 32) | np.arange(len(ends)))
         order &= (1 << 32) - 1
-        sorted_ends = ends.take(order)
-        first = np.flatnonzero(np.diff(sorted_ends, prepend=-1))
-        passed = first[np.diff(first, append=len(ends)) == 2]
-        kinds = np.tile(self._kinds, 2)
-        vertex = sorted_ends.take(passed)
-        passed = passed[(kinds.take(order.take(passed)) == kinds.take(order.take(passed + 1)))
-                        & ~self._opened.take(vertex)]
-        self._rank[sorted_ends.take(passed)] = _ON
-        self._rank[self._locked] = _HELD
+        self._ends = ends.take(order)
         self._keys = np.sort(np.minimum(*self._edges) * count + np.maximum(*self._edges))
         self._neighbors = self._edges[::-1].ravel().take(order)
-        self._ends = sorted_ends
 
     def holds(self, one: Ints, other: Ints) -> tuple[Bools, Bools]:
         """Tell which end of each edge must stay where it is; where both must, the edge may not go.
@@ -69,16 +54,12 @@ class LineGuard:
         ----------
         one, other : ndarray, (e,) int64
         """
-        first, second = self._rank.take(one), self._rank.take(other)
-        holds_one, holds_other = first > second, second > first
-        holds_one |= self._locked.take(one)
-        holds_other |= self._locked.take(other)
-        return holds_one, holds_other
+        return self._locked.take(one), self._locked.take(other)
 
     def tolls(self, one: Ints, other: Ints) -> np.ndarray:
         """Return what the cost of each edge is multiplied by, (e,) float32."""
         tolls = np.ones(len(one), np.float32)
-        lined = np.flatnonzero((self._rank.take(one) > _FREE) & (self._rank.take(other) > _FREE))
+        lined = np.flatnonzero(self._lined.take(one) & self._lined.take(other))
         tolls[lined[self._offends(one.take(lined), other.take(lined))]] = self._toll
         return tolls
 
@@ -94,7 +75,7 @@ class LineGuard:
         """Tell the pairs of vertices that a line edge joins."""
         if len(self._keys) == 0:
             return np.zeros(len(one), bool)
-        keys = np.minimum(one, other) * len(self._rank) + np.maximum(one, other)
+        keys = np.minimum(one, other) * len(self._lined) + np.maximum(one, other)
         return self._keys.take(np.searchsorted(self._keys, keys).clip(max=len(self._keys) - 1)) == keys
 
     def _around(self, vertices: Ints) -> tuple[Ints, Ints]:
@@ -134,9 +115,6 @@ class LineGuard:
         start, end = survivor.take(self._edges)
         keys = np.minimum(start, end) * len(survivor) + np.maximum(start, end)
         keys[start == end] = -1
-        keys, number = np.unique(keys, return_inverse=True)
-        kinds = np.zeros(len(keys), np.uint8)
-        np.bitwise_or.at(kinds, number, self._kinds)
-        there = keys >= 0
-        self._kinds, self._edges = kinds[there], np.stack(np.divmod(keys[there], len(survivor)))
+        keys = np.unique(keys)
+        self._edges = np.stack(np.divmod(keys[keys >= 0], len(survivor)))
         self._look()

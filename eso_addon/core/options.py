@@ -94,8 +94,8 @@ class Options:
     material_lines: str = "kept"
     sharp_lines: str = "kept"
     boundary_lines: str = "kept"
-    line_weight: float = 10.0
-    line_toll: float = 100.0
+    line_weight: float = 1.0
+    line_toll: float = 10.0
     locked: ArrayLike | None = None
     importance: ArrayLike | None = None
     threads: int | None = None

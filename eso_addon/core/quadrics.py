@@ -69,7 +69,7 @@ def cross(a: Components, b: Components) -> tuple[np.ndarray, np.ndarray, np.ndar
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
-def boundary_quadrics(points: Floats, normals: Floats, edges: Ints, weight: float) -> Floats:
+def boundary_quadrics(points: Floats, normals: Floats, edges: Ints, weight: float | Floats) -> Floats:
     """Planes through boundary edges, perpendicular to their faces, summed at both ends.
 
     Parameters
@@ -78,7 +78,7 @@ def boundary_quadrics(points: Floats, normals: Floats, edges: Ints, weight: floa
     normals : ndarray, (3, b) float64
         Unit normal of the one face at each edge.
     edges : ndarray, (2, b) int64
-    weight : float
+    weight : float or ndarray, (b,) float64
         Each plane weighs so many times the squared length of its edge.
 
     Returns

@@ -5,12 +5,15 @@ import numpy as np
 
 from .blocks import Blocks
 from .guidance import Guidance
-from .lines import Lines
+from .lines import MATERIAL, Lines
 from .mesh import Floats
 from .options import Options
 from .prepare import Prepared
 from .quadrics import anchored, area_normals, boundary_quadrics, plane_quadrics
 from .variation import surface_variation
+
+# a border of materials is seen at once, a seam only where the texture differs across it
+_BORDER = 10.0
 
 
 def initial_quadrics(mesh: Prepared, options: Options, blocks: Blocks, guidance: Guidance | None = None) -> Floats:
@@ -56,9 +59,10 @@ def line_quadrics(points: Floats, lines: Lines, weight: float) -> Floats:
     """Sum planes through line edges, perpendicular to both their faces: (6, n) float64; see `boundary_quadrics`."""
     sides = lines.pairs.compress(lines.kinds > 0, axis=1)
     normals, areas = area_normals(points, lines.faces)
+    weights = np.where(lines.kinds.compress(lines.kinds > 0) & MATERIAL, weight * _BORDER, weight) / 2
     parts = np.zeros((6, points.shape[1]))
     for ends in (sides[:2], sides[2:]):
         face = ends[0] % lines.faces.shape[1]
         parts += boundary_quadrics(points, normals.take(face, axis=1) / np.maximum(areas.take(face), 1e-300),
-                                   lines.faces.ravel().take(ends), weight / 2)
+                                   lines.faces.ravel().take(ends), weights)
     return parts
