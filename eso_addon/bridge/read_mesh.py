@@ -175,6 +175,7 @@ def scale_transform(obj: bpy.types.Object) -> NDArray[np.float64]:
 
 @contextmanager
 def evaluated_mesh(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Iterator[bpy.types.Mesh]:
+    """Give an object's mesh as modifiers leave it."""
     evaluated = obj.evaluated_get(depsgraph)
     if not evaluated.is_evaluated:
         raise MeshError(
@@ -192,6 +193,7 @@ def evaluated_mesh(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Ite
 
 @contextmanager
 def stored_mesh(obj: bpy.types.Object) -> Iterator[bpy.types.Mesh]:
+    """Give an object's mesh as it is stored, with all attributes, in Edit Mode too."""
     if not obj.data.is_editmode:
         yield obj.data
         return
