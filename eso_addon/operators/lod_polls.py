@@ -11,7 +11,8 @@ def why_not_generate(context: bpy.types.Context) -> str:
     """Say why no levels can be made; empty if they can, as far as can be told before a scope is chosen."""
     if context.mode not in {"OBJECT", "EDIT_MESH"}:
         return "Switch to Object Mode or Edit Mode first"
-    if context.mode == "OBJECT" and any(_can_have_levels(obj) for obj in context.selected_objects):
+    chosen = [obj for obj in (context.active_object, *context.selected_objects) if obj is not None]
+    if context.mode == "OBJECT" and any(map(_can_have_levels, chosen)):
         return ""
     if context.mode == "OBJECT" and context.active_object is None and _has_meshes(context.collection):
         return ""
