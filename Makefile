@@ -7,13 +7,14 @@ READY := $(VENV)/.ready
 READY_BENCH := $(VENV)/.ready-bench
 PIP_INSTALL := $(PY) -m pip install --disable-pip-version-check --quiet
 
-.PHONY: help demo test lint bench package clean
+.PHONY: help demo test lint bench papers package clean
 
 help:
 	@echo "make demo     the LOD levels of the paper's cow, a table and a picture, in out/demo/"
 	@echo "make test     the whole test suite"
 	@echo "make lint     ruff and mypy"
 	@echo "make bench    ours against the other simplifiers"
+	@echo "make papers   the papers' tables and figures again, in out/papers/ (MODELS=DIR: of more meshes)"
 	@echo "make package  the add-on's zip for Blender, in dist/"
 	@echo "make clean    remove everything that these make"
 
@@ -29,6 +30,9 @@ lint: $(READY)
 
 bench: $(READY_BENCH)
 	$(PY) -m benchmarks
+
+papers: $(READY)
+	$(PY) -m evidence $(if $(MODELS),--models "$(MODELS)")
 
 package: $(READY)
 	$(PY) scripts/build_package.py dist
