@@ -96,7 +96,7 @@ def _own_materials(level: bpy.types.Object, image: bpy.types.Image) -> list[bpy.
     if not mesh.materials:
         mesh.materials.append(None)
     own: dict[bpy.types.Material | None, bpy.types.Material] = {}
-    for slot, material in enumerate(mesh.materials):
+    for slot, material in enumerate(list(mesh.materials)):
         if material not in own:
             own[material] = material if material is not None and material.get(_NODE) == mesh.name else \
                 _copied(material, level)
@@ -118,7 +118,7 @@ def _own_materials(level: bpy.types.Object, image: bpy.types.Image) -> list[bpy.
 def _copied(material: bpy.types.Material | None, level: bpy.types.Object) -> bpy.types.Material:
     copy = bpy.data.materials.new(level.name) if material is None else material.copy()
     copy.name = f"{level.name if material is None else material.name}_{level.name}"
-    if not copy.use_nodes:
+    if bpy.app.version < (5, 0):  # later ones always use nodes, and do not want to be asked
         copy.use_nodes = True
     return copy
 

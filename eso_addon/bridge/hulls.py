@@ -81,7 +81,7 @@ def convex_hull(points: NDArray[np.float32], name: str) -> bpy.types.Mesh:
         for point in _outermost(points):
             made.verts.new(point)
         found = bmesh.ops.convex_hull(made, input=made.verts, use_existing_faces=False)
-        inner = [*found["geom_interior"], *found["geom_unused"]]
+        inner = dict.fromkeys([*found["geom_interior"], *found["geom_unused"]])
         bmesh.ops.delete(made, geom=[v for v in inner if isinstance(v, bmesh.types.BMVert)], context="VERTS")
         if len(made.faces) < 4:
             raise MeshError(f"'{name}' would be flat: a collision hull needs a body")

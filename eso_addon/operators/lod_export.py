@@ -71,9 +71,6 @@ class OBJECT_OT_eso_lod_export(bpy.types.Operator):
             groups, key = self._groups(context)
             profile = PROFILES[key]
             path = self._path(profile.ending)
-            for group in groups:
-                if reason := profile.why_not(len(group.levels)):
-                    raise MeshError(f"'{group.base}': {reason}")
             ending = path.suffix.lower()
             export_levels(path, groups, profile.layout, write_stage if ending == ".blend" else WRITERS[ending])
         except (MeshError, OSError, RuntimeError) as error:
@@ -103,6 +100,9 @@ class OBJECT_OT_eso_lod_export(bpy.types.Operator):
             if len(keys) > 1:
                 raise MeshError("these levels were made for several profiles: choose one")
             key = next(iter(keys & set(PROFILES)), "plain")
+        for source in sources:
+            if reason := PROFILES[key].why_not(len(level_info.levels_of(source))):
+                raise MeshError(f"'{source.name}': {reason}")
         groups = groups_of(sources, PROFILES[key].name, PROFILES[key].hull_name)
         if not groups:
             raise MeshError("none of the selected objects has levels: generate some, or export all")
