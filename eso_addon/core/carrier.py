@@ -11,32 +11,26 @@ from numpy.typing import NDArray
 from .adjacency import components
 from .attributes import AttributeSet, Layer, blended
 from .blocks import Blocks
+from .carried import Carried
 from .carry import Places, find_places
 from .edge_data import carried_edges
 from .lines import Lines
 from .mesh import Bools, Floats, Ints
 from .prepare import Prepared
+from .symmetry import Mirror, completed
 from .unflip import areas_of, mapped_by_source, turned_back
 
 
-class Carried(NamedTuple):
-    """A level with all that it carries: vertices as the input parts them.
+class _Level(NamedTuple):
+    """A level on its way: where its wedges and corners lie on the original."""
 
-    Attributes
-    ----------
-    points : ndarray, (k, 3) float64
-    corners : ndarray, (m, 3) int64
-    vertex_map : ndarray, (n,) int64
-    attributes : dict of str to ndarray
-    edges : ndarray, (e, 2) int64
-        What edge attributes belong to.
-    """
-
-    points: Floats
-    corners: Ints
-    vertex_map: Ints
-    attributes: dict[str, NDArray]
-    edges: Ints
+    places: Places
+    slot: Ints
+    target: Ints
+    wedge_of: Ints
+    unmoved: Bools
+    face_map: Ints
+    there: Floats
 
 
 class Carrier:
@@ -50,6 +44,8 @@ class Carrier:
     attributes : AttributeSet
     lines : Lines
     locked : ndarray, (engine's vertices,) bool
+    mirror : Mirror, optional
+        Where the mesh is one half of the input.
 
     Attributes
     ----------
@@ -58,10 +54,13 @@ class Carrier:
     """
 
     def __init__(self, mesh: Prepared, original: tuple[Floats, Ints], attributes: AttributeSet, lines: Lines,
-                 locked: Bools) -> None:
-        self._mesh, self._attributes, self._lines = mesh, attributes, lines
+                 locked: Bools, mirror: Mirror | None = None) -> None:
+        self._mesh, self._attributes, self._lines, self._mirror = mesh, attributes, lines, mirror
+        self._original = original
+        self._own = attributes if mirror is None else mirror.of_half(attributes)
+        faces = original[1] if mirror is None else original[1][mirror.half]
         self._points = np.ascontiguousarray(original[0].take(mesh.source, axis=0).T)
-        self._vertex = original[1].ravel().take(lines.corner)  # the input's vertex at each corner
+        self._vertex = faces.ravel().take(lines.corner)  # the input's vertex at each corner
         self._held = locked.copy()
         self._held[lines.edges] = True
         self.messages = (*attributes.messages, *lines.messages)
@@ -86,8 +85,10 @@ class Carrier:
         survivor : ndarray, (engine's vertices,) int64
             The level's vertex that each has become, -1 if it is gone.
         """
-        there = np.concatenate((placed.T, np.zeros((3, 1))), axis=1)
         survivor = np.where(survivor < 0, len(placed), survivor)
+        if self._mirror is not None:
+            placed = self._flattened(placed, survivor, self._mirror)
+        there = np.concatenate((placed.T, np.zeros((3, 1))), axis=1)
         blocks = Blocks()
         try:
             places = find_places(self._lines, self._points, survivor, there, blocks)
@@ -102,23 +103,40 @@ class Carrier:
         number, wedge_of, vertex_map = self._part(places, slot, target)
         unmoved = (self._points.take(self._lines.faces.ravel().take(slot), axis=1)
                    == there.take(corners.ravel(), axis=1)).all(axis=0)
+        at = _Level(places, slot, target, wedge_of, unmoved, face_map, there)
+        carried = self._values(self._own, at)
+        points, parted = placed.take(places.vertex.take(wedge_of), axis=0), number.reshape(-1, 3)
+        edges, on_edges = carried_edges(self._own, self._points, self._mesh.vertex, self._lines, survivor,
+                                        places.vertex.take(wedge_of), parted, placed)
+        level = Carried(points, parted, vertex_map, self._mesh.face[face_map], {**carried, **on_edges}, edges)
+        if self._mirror is None:
+            return level
+        images = self._values(self._mirror.of_half(self._attributes, mirrored=True), at)
+        return completed(level, images, self._mirror, self._original, self._attributes)
+
+    def _values(self, attributes: AttributeSet, at: _Level) -> dict[str, NDArray]:
+        """Return the attributes of vertices, corners and faces on a level."""
         carried = {}
-        for layer in self._attributes.layers:
+        for layer in attributes.layers:
             if layer.domain == "corner":
-                values = self._at_corners(layer, places, slot, unmoved)
+                values = self._at_corners(layer, at.places, at.slot, at.unmoved)
                 if layer.kind == "uv":
-                    values = self._turned_back(layer, values, places, slot, there)
+                    values = self._turned_back(layer, values, at.places, at.slot, at.there)
             elif layer.domain == "vertex":
-                values = self._at_wedges(layer, places, self._vertex).take(wedge_of, axis=0)
+                values = self._at_wedges(layer, at.places, self._vertex).take(at.wedge_of, axis=0)
             elif layer.domain == "face":
-                values = layer.rows.take(self._mesh.face.take(face_map), axis=0)
+                values = layer.rows.take(self._mesh.face.take(at.face_map), axis=0)
             else:
                 continue
             carried[layer.name] = layer.shaped(values)
-        points, parted = placed.take(places.vertex.take(wedge_of), axis=0), number.reshape(-1, 3)
-        edges, on_edges = carried_edges(self._attributes, self._points, self._mesh.vertex, self._lines, survivor,
-                                        places.vertex.take(wedge_of), parted, placed)
-        return Carried(points, parted, vertex_map, {**carried, **on_edges}, edges)
+        return carried
+
+    def _flattened(self, placed: Floats, survivor: Ints, mirror: Mirror) -> Floats:
+        """Put what has become of vertices in the plane of symmetry into it."""
+        inside = np.flatnonzero(mirror.flat & (self._mesh.vertex >= 0))
+        rows = np.concatenate((placed, np.zeros((1, 3))))
+        rows[survivor.take(self._mesh.vertex.take(inside)), mirror.axis] = 0
+        return rows[:-1]
 
     def _at_corners(self, layer: Layer, places: Places, slot: Ints, unmoved: Bools) -> NDArray:
         values = self._at_wedges(layer, places, self._lines.corner).take(places.target.ravel().take(slot), axis=0)

@@ -14,6 +14,7 @@ from .lines import MATERIAL, SEAM, SHARP, Lines, find_lines
 from .mesh import Bools, Floats, Ints, MeshError
 from .options import Options
 from .prepare import Prepared
+from .symmetry import Mirror
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +42,8 @@ class Guidance:
         return None if self.lines is None else self.lines.edges
 
 
-def guidance_of(mesh: Prepared, original: tuple[Floats, Ints], options: Options) -> Guidance:
+def guidance_of(mesh: Prepared, original: tuple[Floats, Ints], options: Options,
+                mirror: Mirror | None = None) -> Guidance:
     """Find what guides the run on a mesh.
 
     Parameters
@@ -50,6 +52,8 @@ def guidance_of(mesh: Prepared, original: tuple[Floats, Ints], options: Options)
     original : tuple of ndarray
         Vertices (n, 3) float64 and faces (m, 3) int64 as they were given.
     options : Options
+    mirror : Mirror, optional
+        Where `mesh` is one half of it.
 
     Raises
     ------
@@ -64,19 +68,22 @@ def guidance_of(mesh: Prepared, original: tuple[Floats, Ints], options: Options)
     if options.locked is not None:
         chosen = _per_vertex("locked", options.locked, len(vertices)) != 0
         locked[mesh.vertex[chosen & (mesh.vertex >= 0)]] = True
+    if mirror is not None:
+        locked[mesh.vertex[mirror.locked & (mesh.vertex >= 0)]] = True
     importance = _importance(mesh, options, len(vertices))
-    if not options.attributes and not locked.any():
+    if not options.attributes and not locked.any() and mirror is None:
         return Guidance(None, None, None, importance, None)
     attributes = check_attributes(options.attributes or {}, len(vertices), len(faces), options.edges)
     modes = {SEAM: options.seam_lines, MATERIAL: options.material_lines, SHARP: options.sharp_lines}
-    lines = find_lines(mesh, faces, attributes, sum(bit for bit, mode in modes.items() if mode == "ignored"))
+    own, input_faces = (attributes, faces) if mirror is None else (mirror.of_half(attributes), faces[mirror.half])
+    lines = find_lines(mesh, input_faces, own, sum(bit for bit, mode in modes.items() if mode == "ignored"))
     for bit, mode in modes.items():
         if mode == "locked":
             locked[lines.along(bit)] = True
     guard = None
     if (lines.kinds > 0).any() and options.method != "feature":
         guard = LineGuard(lines.edges, mesh.points.shape[1], options.line_toll)
-    carrier = Carrier(mesh, original, attributes, lines, locked)
+    carrier = Carrier(mesh, original, attributes, lines, locked, mirror)
     return Guidance(lines, guard, locked if locked.any() else None, importance, carrier)
 
 

@@ -101,7 +101,7 @@ def level(mesh: Prepared, record: CollapseRecord, original: Mesh, length: int,
         carried = carrier.carry(placed, corners, face_map, merged)
         messages = (*mesh.messages, *carrier.messages)
         return SimplifyResult(carried.points, carried.corners.astype(np.int32), carried.vertex_map.astype(np.int32),
-                              mesh.face[face_map].astype(np.int32), True, messages, record, original,
+                              carried.face_map.astype(np.int32), True, messages, record, original,
                               carried.attributes, carried.edges.astype(np.int32))
     face_map = mesh.face[face_map]
     if mesh.sheet is not None:

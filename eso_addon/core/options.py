@@ -67,6 +67,8 @@ class Options:
         Vertices that neither go nor move.
     importance : array_like, (n,) float, optional
         What errors at each vertex count; one is as usual.
+    symmetry : str
+        "x", "y" or "z" for a symmetric result of a mesh that is symmetric across this axis, or "none".
     threads : int, optional
         All processors, at most four, where not given. The result does not depend on it.
     """
@@ -98,6 +100,7 @@ class Options:
     line_toll: float = 10.0
     locked: ArrayLike | None = None
     importance: ArrayLike | None = None
+    symmetry: str = "none"
     threads: int | None = None
 
     def __post_init__(self) -> None:
@@ -116,6 +119,8 @@ class Options:
         number("prune", self.prune, 0, np.inf)
         number("line_weight", self.line_weight, 0, 1e6)
         number("line_toll", self.line_toll, 1, 1e6)
+        if self.symmetry not in ("none", "x", "y", "z"):
+            raise MeshError(f"symmetry is {self.symmetry!r}: choose x, y, z or none")
         for name in ("seam_lines", "material_lines", "sharp_lines", "boundary_lines"):
             if getattr(self, name) not in LINES:
                 raise MeshError(f"{name} is {getattr(self, name)!r}: choose one of {', '.join(LINES)}")

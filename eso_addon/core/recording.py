@@ -16,6 +16,7 @@ from .levels import Mesh, SimplifyResult, in_input_units, judge_count, level, wi
 from .options import Options
 from .prepare import Prepared, prepare
 from .record import CollapseRecord
+from .symmetry import mirror_of
 from .weigh import initial_quadrics
 
 Value = TypeVar("Value")
@@ -85,11 +86,16 @@ def recording_steps(original: Mesh, options: Options, least: int) -> Generator[f
     options : Options
     least : int
     """
-    mesh = prepare(*original, join=options.weld, prune=options.prune)
+    vertices, faces = original
+    mirror = mirror_of(vertices, faces, options.symmetry) if options.symmetry != "none" else None
+    rest = 0 if mirror is None else len(mirror.rest)
+    if mirror is not None:
+        faces, least = faces[mirror.half], max((least - rest) // 2, 0)
+    mesh = prepare(vertices, faces, join=options.weld, prune=options.prune)
     blocks = Blocks(options.threads)
     try:
         yield 0.02
-        guidance = guidance_of(mesh, original, options)
+        guidance = guidance_of(mesh, original, options, mirror)
         guide = guide_for(mesh, options, guidance.edges) if options.method == "feature" else None
         quadrics = initial_quadrics(mesh, options, blocks, guidance)
         yield 0.12
@@ -99,7 +105,12 @@ def recording_steps(original: Mesh, options: Options, least: int) -> Generator[f
         record = yield from scaled(run, lambda left: 0.12 + 0.88 * (1 - (left - least) / total))
     finally:
         blocks.close()
-    return Recording(mesh, in_input_units(record, mesh, original[0]), original, options, least, guidance.carrier)
+    record = in_input_units(record, mesh, vertices)
+    if mirror is not None:  # each collapse stands for two
+        least = 2 * least + rest
+        record = replace(record, faces_before=2 * record.faces_before + rest,
+                         faces_left=2 * record.faces_left + rest)
+    return Recording(mesh, record, original, options, least, guidance.carrier)
 
 
 def scaled(steps: Generator[Any, None, Value], scale: Any) -> Generator[float, None, Value]:  # noqa: ANN401
