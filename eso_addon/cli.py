@@ -10,6 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 from .cli_batch import add_word as add_batch
+from .cli_large import add_options as add_large_options
+from .cli_large import is_large, simplify_file
 from .cli_lod import add_options as add_lod_options
 from .cli_lod import finish, lod, make_chains, outcome
 from .cli_serve import add_word as add_serve
@@ -142,6 +144,7 @@ def _parser() -> argparse.ArgumentParser:
     targets.add_argument("--max-error", type=_length, metavar="E", help="largest deviation, in the file's units")
     targets.add_argument("--epsilon", type=_epsilon, metavar="X",
                          help="method feature: go on until only features are left, those whose weight is below X")
+    add_large_options(simplify)
     _add_engine_words(simplify)
     lod = _add_word(words, "lod", run_lod, "write several levels of detail", "IN", "OUT")
     add_lod_options(lod, _ratio, _count, _length)
@@ -225,6 +228,9 @@ def _simplify(args: argparse.Namespace) -> None:
     options = _engine_options(args)
     if args.epsilon is not None and options.setdefault("method", "feature") != "feature":
         raise ValueError("--epsilon belongs to --method feature: leave out one of them")
+    if is_large(args):
+        simplify_file(args, options)
+        return
     model = _open(args.input, args.output)
     started = time.perf_counter()
     if args.epsilon is not None:

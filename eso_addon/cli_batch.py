@@ -29,7 +29,7 @@ def add_word(words: Any, add_lod: Callable[[argparse.ArgumentParser], None],  # 
     batch.add_argument("output", type=Path, nargs="?", metavar="OUT_DIR", help="the folder for their levels")
     where = batch.add_mutually_exclusive_group()
     where.add_argument("--scheduler", default="", metavar="ADDRESS", help="of a Dask scheduler, as tcp://host:8786")
-    where.add_argument("--workers", type=_workers, metavar="N", help="processes on this computer (default: all cores)")
+    where.add_argument("--workers", type=workers, metavar="N", help="processes on this computer (default: all cores)")
     batch.add_argument("--timeout", type=_seconds, default=1800.0, metavar="S", help="seconds for one file (1800)")
     batch.add_argument("--memory-limit", type=memory, metavar="SIZE",
                        help="memory of one worker, as 4G (default: its share of this computer's)")
@@ -51,7 +51,8 @@ def memory(word: str) -> int:
     return size
 
 
-def _workers(word: str) -> int:
+def workers(word: str) -> int:
+    """Read a number of processes."""
     if word.isascii() and word.isdigit() and 1 <= int(word) <= 1024:
         return int(word)
     raise argparse.ArgumentTypeError(f"{word} is no number of workers: give 1 or more")
@@ -132,8 +133,8 @@ def _farm(args: argparse.Namespace) -> Any:  # noqa: ANN401 - a Farm
     from .farm.batch import Farm
     from .farm.machine import cores, memory_of_machine
 
-    workers = args.workers or cores()
-    return Farm(args.scheduler, workers, args.timeout, args.memory_limit or memory_of_machine() // workers)
+    count = args.workers or cores()
+    return Farm(args.scheduler, count, args.timeout, args.memory_limit or memory_of_machine() // count)
 
 
 def _tell(folder: Path, rows: Any) -> None:  # noqa: ANN401 - rows of the ledger

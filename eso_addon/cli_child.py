@@ -7,13 +7,9 @@ import argparse
 import contextlib
 import io
 import json
-import os
-import sys
 import tempfile
-import threading
-from collections.abc import Iterable
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 
 def answer(request: dict[str, Any]) -> dict[str, Any]:
@@ -45,30 +41,7 @@ def answer(request: dict[str, Any]) -> dict[str, Any]:
         return json.loads(figures.read_text(encoding="utf-8"))
 
 
-def serve(requests: Iterable[bytes], answers: BinaryIO) -> None:
-    """Answer each line by a line."""
-    for line in requests:
-        answers.write((json.dumps(answer(json.loads(line))) + "\n").encode())
-        answers.flush()
-
-
-def _requests() -> Iterable[bytes]:
-    """Give the lines of standard input; the process ends with it, in the middle of a file too."""
-    import queue
-
-    lines: queue.SimpleQueue[bytes] = queue.SimpleQueue()
-
-    def listen() -> None:
-        for line in sys.stdin.buffer:
-            lines.put(line)
-        os._exit(1)  # whoever wanted the answer is gone
-
-    threading.Thread(target=listen, daemon=True).start()
-    while True:
-        yield lines.get()
-
-
 if __name__ == "__main__":
-    own = os.fdopen(os.dup(1), "wb")  # what Blender prints must not stand between the answers
-    os.dup2(2, 1)
-    serve(_requests(), own)
+    from .farm.serving import serve
+
+    serve(answer)

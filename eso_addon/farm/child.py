@@ -30,7 +30,7 @@ class Child:
     Parameters
     ----------
     module : str
-        Its name. It reads its standard input and ends with it; see `serve`.
+        Its name. It calls `serving.serve`.
     """
 
     def __init__(self, module: str) -> None:
@@ -126,13 +126,16 @@ class Child:
 _mine = threading.local()
 
 
-def work_off(module: str, request: Mapping[str, Any], timeout: float, memory: int) -> dict[str, Any]:
+def work_off(module: str, request: Mapping[str, Any], timeout: float, memory: int, *,
+             keep: bool = True) -> dict[str, Any]:
     """Have a request worked off in this thread's child; what crashes or hangs is tried again once.
 
     Parameters
     ----------
     module, request, timeout, memory
         As of `Child`.
+    keep
+        Leave the child to the next request of this thread.
 
     Returns
     -------
@@ -150,7 +153,7 @@ def work_off(module: str, request: Mapping[str, Any], timeout: float, memory: in
         own += answer.get("fault") == "own"
         if "fault" not in answer or own >= _OWN_FAULT or tries >= _ANY_FAULT:
             break
-    if answer.get("error") or resident_of(child) > memory // 2:  # the next one begins with a clean slate
+    if not keep or answer.get("error") or resident_of(child) > memory // 2:  # the next one begins with a clean slate
         child.close()
     return {**answer, "tries": tries, "seconds": time.perf_counter() - started, "memory": child.peak}
 
