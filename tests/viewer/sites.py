@@ -75,7 +75,7 @@ def stats(page: Any) -> dict[str, Any]:  # noqa: ANN401
     return page.evaluate("document.querySelector('eso-viewer').stats")
 
 
-def until(page: Any, condition: str, seconds: float = 60) -> dict[str, Any]:  # noqa: ANN401
+def until(page: Any, condition: str, seconds: float = 40) -> dict[str, Any]:  # noqa: ANN401
     """Wait until something holds of the viewer's figures, `s`; give them."""
     asked = f"(() => {{ const s = document.querySelector('eso-viewer')?.stats; return s && ({condition}) }})()"
     end = time.monotonic() + seconds

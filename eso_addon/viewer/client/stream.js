@@ -56,16 +56,16 @@ export class Stream {
     for (let attempt = 0; ; ) {
       const before = this.received;
       try {
-        if (this.wish.paused || (this.head && !(await this.next()))) await this.change();
-        else if (!this.head) await this.open();
+        if (!this.head) await this.open();
+        else if (this.wish.paused || !(await this.next())) await this.change();
         attempt = 0;
       } catch (error) {
         if (this.received > before) attempt = 0;
         if (error instanceof LineError && error.again) {
           const seconds = Math.min(0.5 * 2 ** attempt++, 10);
           this.tell({ type: 'trouble', text: error.message, seconds });
+          this.troubled = true;
           await this.change(1000 * seconds);
-          this.tell({ type: 'trouble', text: '' });
         } else {
           const known = error instanceof StreamError || error instanceof LineError;
           const memory = error instanceof RangeError && /alloc|length/i.test(error.message);
@@ -104,7 +104,7 @@ export class Stream {
         at += part.length;
         if (!more) break;
         if (abort.signal.aborted && this.line.ranges) break;
-        while (this.wish.paused) await this.change(); // without ranges the line is held, not left
+        while (this.wish.paused && this.head) await this.change(); // without ranges the line is held, not left
         if (budget && !this.line.ranges) await this.pay(part.length);
       }
     } catch (error) {
@@ -129,6 +129,8 @@ export class Stream {
 
   count(bytes) {
     this.received += bytes;
+    if (this.troubled) this.tell({ type: 'trouble', text: '' });
+    this.troubled = false;
     const time = now();
     this.pace ??= { time, bytes: 0 };
     this.pace.bytes += bytes;
