@@ -7,6 +7,7 @@ from contextlib import contextmanager
 import bpy
 
 _ANYWHERE = {"ARMATURE"}  # what is simplified is the mesh at rest, whatever comes before or after
+_SIMULATED = {"CLOTH", "SOFT_BODY", "COLLISION", "DYNAMIC_PAINT"}  # never put into a mesh: they go on on the new one
 
 
 def live_modifiers(obj: bpy.types.Object, types: Collection[str]) -> list[str]:
@@ -17,7 +18,7 @@ def live_modifiers(obj: bpy.types.Object, types: Collection[str]) -> list[str]:
     obj : bpy.types.Object
     types : collection of str
         Kinds of modifiers, such as "ARMATURE" or "MIRROR". A Mirror or Subdivision Surface stays live only if nothing
-        but such modifiers comes after it: what comes after works on its result.
+        but such modifiers comes after it: what comes after works on its result. Simulations always stay.
 
     Returns
     -------
@@ -27,7 +28,8 @@ def live_modifiers(obj: bpy.types.Object, types: Collection[str]) -> list[str]:
     is_tail = True
     for modifier in reversed(obj.modifiers):
         is_tail = is_tail and modifier.type in types
-        if modifier.type in types and (is_tail or modifier.type in _ANYWHERE):
+        stays = modifier.type in types and (is_tail or modifier.type in _ANYWHERE)
+        if stays or modifier.type in _SIMULATED:
             names.append(modifier.name)
     return names[::-1]
 

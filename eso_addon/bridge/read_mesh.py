@@ -35,6 +35,7 @@ class MeshArrays:
     materials: tuple["bpy.types.Material | None", ...]
     left_behind: tuple[str, ...]  # data that simplified meshes lose, by name
     template: bpy.types.Mesh  # for what a mesh has besides elements
+    selected: NDArray[np.bool_]  # (m,)
     layers: tuple[Layer, ...] = ()
     active: dict[str, str] | None = None  # names of active and rendered layers
     normals: NDArray[np.float32] | None = None  # (corners, 3) custom normals
@@ -230,6 +231,7 @@ def _arrays_of(obj: bpy.types.Object, mesh: bpy.types.Mesh, transform: NDArray[n
         materials=tuple(material and material.original for material in mesh.materials),
         left_behind=names_left_behind(mesh, lost),
         template=obj.data,
+        selected=_read_or(mesh, ".select_poly", len(mesh.polygons), np.bool_)[polygon],
         **(_carried_of(obj, mesh, keys) if carry else {}),
     )
 

@@ -1,13 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The operator that makes one version of the active mesh with fewer triangles."""
 
+from typing import Any
+
 import bpy
 
 from ..bridge import objects
+from ..bridge.modifiers import live_modifiers, switched_off
 from ..bridge.read_mesh import MeshArrays, read_mesh
+from ..bridge.regions import group_options, outside_selection, target_for_selection
 from ..bridge.write_mesh import write_mesh
 from ..core.levels import SimplifyResult
 from ..core.mesh import MeshError
+from ..core.screen import extent_of
 from ..jobs.modal import EngineOperator
 from ..jobs.replay import replayed_steps
 from ..jobs.worker import Steps
@@ -26,19 +31,21 @@ class OBJECT_OT_eso_simplify(EngineOperator, SimplifyOptions, bpy.types.Operator
 
     _object: bpy.types.Object
     _source: MeshArrays
+    _live: list[str]
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Need an active mesh object."""
         return poll_with(cls, why_not_simplify(context))
 
-    def draw(self, _context: bpy.types.Context) -> None:
+    def draw(self, context: bpy.types.Context) -> None:
         """Draw the redo panel."""
         self.layout.use_property_split = True
         self.draw_target(self.layout)
         self.layout.prop(self, "in_place")
         if self.in_place:
             self.layout.prop(self, "all_users")
+        self.draw_regions(self.layout, context.active_object)
         self.draw_engine(self.layout)
 
     def prepare(self, context: bpy.types.Context) -> Steps[list[SimplifyResult]]:
@@ -47,20 +54,38 @@ class OBJECT_OT_eso_simplify(EngineOperator, SimplifyOptions, bpy.types.Operator
         reason = objects.why_not_in_place(self._object) if self.in_place else ""
         if reason:
             raise MeshError(reason)
-        self._source = read_mesh(self._object, apply_modifiers=self.apply_modifiers, carry=True)
-        targets = {f"{name}s": [value] for name, value in self.simplify_target().items()}
+        self._live = live_modifiers(self._object, {"ARMATURE"}) if self.apply_modifiers else []
+        with switched_off(self._object, self._live):
+            self._source = read_mesh(self._object, apply_modifiers=self.apply_modifiers, carry=True)
+        targets, regions = self._asked()
         arrays = self._source.vertices, self._source.triangles
-        options = {**self.engine_options(), **self._source.carried}
+        options = {**self.engine_options(), **self._source.carried, **regions}
         return with_errors_if_run(replayed_steps(*arrays, targets=targets, options=options))
+
+    def _asked(self) -> tuple[dict[str, Any], dict[str, Any]]:
+        """Give the target, and the engine's options for parts that are treated apart."""
+        source, target, regions = self._source, self.simplify_target(), {}
+        if self.target == "screen":
+            extent = extent_of(source.vertices, source.triangles)
+            target = {"max_error": self.screen().error_at(extent, self.screen_size)}
+        if self.vertex_group:
+            regions = group_options(source, self.vertex_group, use=self.group_use, factor=self.group_factor,
+                                    invert=self.invert_group)
+        outside = outside_selection(source) if self.only_selected and self._object.mode == "EDIT" else None
+        if outside is not None:
+            regions["locked"] = outside | regions.get("locked", False)
+            target = target_for_selection(source, target)
+        return {f"{name}s": [value] for name, value in target.items()}, regions
 
     def finish(self, context: bpy.types.Context, results: list[SimplifyResult]) -> None:
         """Write the result beside the source, or in its place."""
         result, obj = results[0], self._object
         before, after, error = len(self._source.triangles), len(result.faces), known_error(result)
         objects.leave_edit_mode(obj)
-        mesh = write_mesh(result, self._source, f"{obj.data.name}_ESO")
+        mesh = write_mesh(result, self._source, f"{obj.data.name}_ESO", **self.writing())
         if self.in_place:
-            objects.replace_mesh(obj, mesh, modifiers_applied=self.apply_modifiers, all_users=self.all_users)
+            objects.replace_mesh(obj, mesh, modifiers_applied=self.apply_modifiers, all_users=self.all_users,
+                                 live=self._live)
         else:
             new = objects.add_object(
                 obj,
@@ -68,6 +93,7 @@ class OBJECT_OT_eso_simplify(EngineOperator, SimplifyOptions, bpy.types.Operator
                 f"{obj.name}_ESO",
                 objects.collections_for(obj, context.scene),
                 modifiers_applied=self.apply_modifiers,
+                live=self._live,
                 properties=objects.result_properties(obj, before, after, error),
             )
             objects.select_only([new], context.view_layer)

@@ -6,12 +6,30 @@
 from typing import Any
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
+
+from ..core.screen import Screen
 
 _TARGETS = (
     ("ratio", "Ratio", "Keep this share of the triangles"),
     ("count", "Count", "Keep this many triangles"),
     ("error", "Error", "Keep as few triangles as this deviation allows"),
+    ("screen", "Screen", "Keep as few triangles as look the same at a size on screen"),
+)
+_LINES = (
+    ("kept", "Kept", "Simplified along themselves, never across"),
+    ("locked", "Locked", "Not touched"),
+    ("ignored", "Ignored", "Simplified like everything else"),
+)
+_SYMMETRIES = (
+    ("none", "None", "Both sides are simplified as they come"),
+    ("x", "X", "A mesh that is symmetric over X stays so"),
+    ("y", "Y", "A mesh that is symmetric over Y stays so"),
+    ("z", "Z", "A mesh that is symmetric over Z stays so"),
+)
+_GROUP_USES = (
+    ("favour", "Favour", "Errors count for more where the group's weight is high"),
+    ("protect", "Protect", "Vertices whose weight is at least one half are not touched"),
 )
 _METHODS = (
     ("eso", "ESO", "Extended second-order weights: features by the surface variation within several rings"),
@@ -27,6 +45,7 @@ _PRESETS = (
     ("default", "Default", "The best that was measured"),
     ("paper", "Paper", "Equations 8 and 9 as printed, for comparison"),
 )
+_LINE_NAMES = ("seam_lines", "material_lines", "sharp_lines", "boundary_lines")
 
 
 class EngineOptions:
@@ -58,6 +77,22 @@ class EngineOptions:
         min=0.0,
         subtype="DISTANCE",
     )
+    seam_lines: EnumProperty(
+        name="Seams", description="Seams of UV maps and other values that jump", items=_LINES, default="kept"
+    )
+    material_lines: EnumProperty(
+        name="Material Borders", description="Edges between materials", items=_LINES, default="kept"
+    )
+    sharp_lines: EnumProperty(
+        name="Sharp Edges", description="Marked edges, creases, and where normals are split", items=_LINES,
+        default="kept"
+    )
+    boundary_lines: EnumProperty(
+        name="Boundaries", description="Edges of one face only", items=_LINES, default="kept"
+    )
+    symmetry: EnumProperty(
+        name="Symmetry", description="Give a symmetric result of a symmetric mesh", items=_SYMMETRIES, default="none"
+    )
     apply_modifiers: BoolProperty(
         name="Apply Modifiers",
         description="Simplify the mesh as modifiers and shape keys show it; otherwise the results keep the modifiers",
@@ -77,15 +112,21 @@ class EngineOptions:
         row.active = self.preset == "default" and self.placement == "optimal"
         row.prop(self, "refit")
         layout.prop(self, "weld")
+        for name in _LINE_NAMES:
+            layout.prop(self, name)
+        layout.prop(self, "symmetry")
         layout.prop(self, "apply_modifiers")
 
     def engine_options(self) -> dict[str, Any]:
         """Give the options as `simplify` and `lod_chain` take them."""
-        names = ("preset", "method", "rings", "placement", "weld", "prune")
+        names = ("preset", "method", "rings", "placement", "weld", "prune", "symmetry", *_LINE_NAMES)
         options = {name: getattr(self, name) for name in names}
         if self.preset == "default":  # the paper does not refit
             options["refit"] = self.refit
         return options
+
+
+_TARGET_NAMES = {"ratio": "ratio", "count": "faces_target", "error": "max_error", "screen": "max_error"}
 
 
 class SimplifyOptions(EngineOptions):
@@ -110,6 +151,39 @@ class SimplifyOptions(EngineOptions):
         precision=5,
         subtype="DISTANCE",
     )
+    screen_size: FloatProperty(
+        name="Size", description="Pixels of the longest side on screen", default=400.0, min=1.0, soft_max=4000.0
+    )
+    pixel_error: FloatProperty(
+        name="Pixels", description="Largest error that may be seen, in pixels", default=1.0, min=0.01, soft_max=10.0
+    )
+    resolution: IntProperty(
+        name="Resolution", description="Pixels along the wider side of the picture", default=1920, min=1, max=100_000
+    )
+    lens: FloatProperty(
+        name="Lens", description="Focal length in millimetres, on a sensor 36 mm wide", default=50.0, min=1.0,
+        soft_max=250.0
+    )
+    vertex_group: StringProperty(name="Vertex Group", description="Protects or favours painted regions", default="")
+    group_use: EnumProperty(name="Group", items=_GROUP_USES, default="favour")
+    group_factor: FloatProperty(
+        name="Factor", description="How many times more errors count at full weight", default=10.0, min=0.0,
+        soft_max=100.0
+    )
+    invert_group: BoolProperty(name="Invert", description="Use one less the weight", default=False)
+    only_selected: BoolProperty(
+        name="Only Selected", description="In Edit Mode, simplify the selected faces and leave the others",
+        default=True
+    )
+    join_quads: BoolProperty(
+        name="Join Quads", description="Join the triangles of changed quads again; unchanged polygons always stay",
+        default=False
+    )
+    keep_loose: BoolProperty(name="Keep Loose", description="Keep points and edges without faces", default=True)
+    influences: IntProperty(
+        name="Influences", description="Bones that may move a vertex; -1: as many as in the source, 0: any number",
+        default=-1, min=-1, soft_max=8
+    )
     in_place: BoolProperty(name="In Place", description="Replace the object's own mesh", default=False)
     all_users: BoolProperty(
         name="All Users",
@@ -120,13 +194,36 @@ class SimplifyOptions(EngineOptions):
     def draw_target(self, layout: bpy.types.UILayout) -> None:
         """Draw the target's kind and its value."""
         layout.row(align=True).prop(self, "target", expand=True)
-        layout.prop(self, {"ratio": "ratio", "count": "faces_target", "error": "max_error"}[self.target])
+        names = ("screen_size", "pixel_error", "resolution", "lens")
+        for name in names if self.target == "screen" else (_TARGET_NAMES[self.target],):
+            layout.prop(self, name)
+
+    def draw_regions(self, layout: bpy.types.UILayout, obj: bpy.types.Object | None) -> None:
+        """Draw what is protected, and what becomes of polygons and weights."""
+        if obj is not None:
+            layout.prop_search(self, "vertex_group", obj, "vertex_groups")
+        if self.vertex_group:
+            layout.prop(self, "group_use")
+            if self.group_use == "favour":
+                layout.prop(self, "group_factor")
+            layout.prop(self, "invert_group")
+        for name in ("only_selected", "join_quads", "keep_loose", "influences"):
+            layout.prop(self, name)
+
+    def screen(self) -> Screen:
+        """Give the picture in which an error is judged."""
+        return Screen(resolution=self.resolution, lens=self.lens, pixels=self.pixel_error)
+
+    def writing(self) -> dict[str, Any]:
+        """Give the options of `write_mesh`."""
+        return {"join_quads": self.join_quads, "keep_loose": self.keep_loose,
+                "influences": None if self.influences < 0 else self.influences}
 
     def simplify_target(self) -> dict[str, Any]:
         """Give the target as `simplify` takes it."""
-        name = {"ratio": "ratio", "count": "faces_target", "error": "max_error"}[self.target]
+        name = _TARGET_NAMES[self.target]
         return {name: getattr(self, name)}
 
     def expected_triangles(self, now: int) -> int | None:
         """Give the triangles that the target asks for, None if only the engine can tell."""
-        return {"ratio": round(now * self.ratio), "count": min(now, self.faces_target), "error": None}[self.target]
+        return {"ratio": round(now * self.ratio), "count": min(now, self.faces_target)}.get(self.target)
