@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Levels in a file, named and laid out as an engine wants them."""
 
+import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -82,7 +83,8 @@ def export_levels(path: Path, groups: Sequence[LevelGroup], layout: str, write: 
     with _lod_groups(grouped) as children, _marked(groups, layout):
         names |= {empty: base for empty, (base, _) in children.items()}
         parents |= {level: empty for empty, (_, levels) in children.items() for level in levels}
-        with staged(path.stem, names, parents), hooked(), atomic_output(path) as draft:
+        with staged(path.stem, names, parents), hooked(), atomic_output(path) as draft, warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of what Blender's exporters ask of numpy
             write(draft)
 
 
