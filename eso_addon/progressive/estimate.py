@@ -14,7 +14,8 @@ if TYPE_CHECKING:
     from .patches import Patches
 
 _SAMPLE = 512
-# levels with faces in this ratio are measured; those between are taken to be as far off as the coarser one
+# levels with faces in this ratio are measured; those between lie on the line between two, which is never less than the
+# convex fall of errors
 _STEP = 0.6
 # of larger levels only faces near what the samples have become are looked at
 _LARGE = 8192
@@ -47,7 +48,9 @@ def estimated_errors(patches: Patches, costs: Floats) -> Floats:
             squared = ClosestPoints(points, near).query(points[sample])[2]
             errors[level] = np.sqrt(squared.max(initial=0.0))
             measured = widths[level]
-    return np.maximum.accumulate(_from_coarser(errors)[::-1])[::-1]
+    known = np.flatnonzero(errors >= 0)
+    # with more faces no farther off
+    return np.interp(widths, widths[known], np.maximum.accumulate(errors[known][::-1])[::-1])
 
 
 def _sample(costs: Floats) -> Ints:
@@ -70,9 +73,3 @@ def _near(faces: Ints, places: Ints, count: int) -> Ints:
     near[places] = True
     near[faces.compress(near.take(faces).any(axis=0), axis=1)] = True
     return faces.compress(near.take(faces).any(axis=0), axis=1)
-
-
-def _from_coarser(errors: Floats) -> Floats:
-    """Fill what is below 0 from the left."""
-    known = np.maximum.accumulate(np.where(errors >= 0, np.arange(len(errors)), 0))
-    return np.maximum(errors.take(known), 0.0)

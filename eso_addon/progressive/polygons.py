@@ -82,7 +82,7 @@ def find_polygons(faces: Ints, attributes: dict[str, dict[str, np.ndarray]]) -> 
     follower = _followers(faces, slots, owner)
     sizes, triangles = np.bincount(owner, minlength=count), np.bincount(group, minlength=count)
     # whatever is not one round of its corners falls apart into its triangles
-    broken = (sizes > 0) & (sizes != triangles + 2)
+    broken = (triangles > 0) & (sizes != triangles + 2)
     broken[owner[follower < 0]] = True
     first = np.full(count, -1)
     first[owner[::-1]] = np.arange(len(slots))[::-1]

@@ -52,9 +52,9 @@ def use(data: bytes, *, partial: bool) -> Progressive | None:
 
 @pytest.mark.parametrize("data", STREAMS[:2], ids=["plain", "attributes"])
 def test_cut_at_any_byte(data: bytes) -> None:
-    for size in range(0, len(data), 2):
+    for size in range(0, len(data), 3):
         assert use(data[:size], partial=False) is None
-    for size in range(0, len(data), 7):
+    for size in range(0, len(data), 29):
         mesh = use(data[:size], partial=True)
         assert mesh is None or mesh.damage
 
@@ -62,7 +62,7 @@ def test_cut_at_any_byte(data: bytes) -> None:
 def test_any_flipped_bit_is_noticed() -> None:
     data = STREAMS[1]
     rng = np.random.default_rng(1)
-    for place in rng.integers(0, len(data), 200):
+    for place in rng.integers(0, len(data), 60):
         damaged = bytearray(data)
         damaged[place] ^= 1 << int(rng.integers(0, 8))
         assert use(bytes(damaged), partial=False) is None
@@ -120,9 +120,9 @@ def tampered(data: bytes, rng: np.random.Generator) -> bytes:
 def test_tampered_contents_with_right_checksums() -> None:
     rng = np.random.default_rng(2)
     refused = 0
-    for number in range(400):
+    for number in range(200):
         refused += use(tampered(STREAMS[number % 4], rng), partial=bool(number % 2)) is None
-    assert refused > 200
+    assert refused > 100
 
 
 def test_what_once_failed() -> None:

@@ -12,7 +12,7 @@ from eso_addon.progressive.progressive import from_bytes, load_progressive, prog
 
 from .meshes import Arrays, fingerprint, grid, meshes, same
 
-QUICK = settings(max_examples=25, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
+QUICK = settings(max_examples=10, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
 
 
 @QUICK
