@@ -148,6 +148,8 @@ class Carrier:
         faces = places.target.ravel().take(slot).reshape(-1, 3)
         source = layer.rows.take(self._lines.corner.ravel().take(slot), axis=0).astype(np.float64).reshape(-1, 3, 2)
         turns = areas_of(source)
+        if not (areas_of(values.reshape(-1, 3, 2)) * turns < 0).any():
+            return values
         uv = np.zeros((len(places.vertex), 2))
         uv[faces.ravel()] = values
         lined = np.zeros(there.shape[1], bool)

@@ -154,7 +154,7 @@ def _bits(layer: Layer) -> int:
 def _marked(layer: Layer, edges: Ints, keys: Ints, count: int) -> Bools:
     """Tell the edges, given by ascending keys, that a mark is on."""
     chosen = edges[(layer.rows != 0).any(axis=1)]
-    wanted = chosen.min(axis=1, initial=0) * count + chosen.max(axis=1)
+    wanted = chosen.min(axis=1) * count + chosen.max(axis=1)
     wanted = wanted[chosen.min(axis=1) >= 0]
     found = np.zeros(len(keys), bool)
     if len(keys):

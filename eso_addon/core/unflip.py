@@ -7,9 +7,9 @@ import numpy as np
 
 from .mesh import Bools, Floats, Ints
 
-_ROUNDS = 8
-# a triangle that lost more than this part of the area that its source would give it counts as turned
-_THIN = 1e-6
+_ROUNDS = 3
+# a point may go so far, in sides of its triangles
+_FAR = 0.25
 
 
 def turned_back(uv: Floats, faces: Ints, turns: Floats, movable: Bools) -> tuple[Floats, Bools]:
@@ -31,33 +31,33 @@ def turned_back(uv: Floats, faces: Ints, turns: Floats, movable: Bools) -> tuple
     still : ndarray, (m,) bool
         Triangles that are turned all the same.
     """
-    uv = uv.copy()
+    start, uv = uv, uv.copy()
     bad = _turned(uv, faces, turns)
-    beside = np.zeros(len(uv), bool)
-    for number in range(_ROUNDS):
+    for _ in range(_ROUNDS):
         if not bad.any():
-            break
-        beside[faces[bad]] = True
-        if number >= _ROUNDS // 2:  # what one point alone cannot mend, its neighbours may
-            beside[faces[beside.take(faces).any(axis=1)]] = True
-        around = faces.compress(beside.take(faces).any(axis=1), axis=0)
-        moving = np.flatnonzero(beside & movable)
-        before = uv.take(moving, axis=0)
-        uv[moving] = _middles(uv, around, moving)
-        worse = _turned(uv, faces, turns)
-        if worse.sum() > 2 * bad.sum():
-            uv[moving] = before
-            break
-        bad = worse
-    return uv, bad
+            return uv, bad
+        moving = np.unique(faces[bad])
+        moving = moving[movable.take(moving)]
+        beside = np.zeros(len(uv), bool)
+        beside[moving] = True
+        uv[moving] = _middles(uv, faces.compress(beside.take(faces).any(axis=1), axis=0), moving)
+        bad = _turned(uv, faces, turns)
+    # what did not help, or went far, is taken back
+    size = np.zeros(len(uv))
+    for corner in range(3):
+        side = start.take(faces[:, corner], axis=0) - start.take(faces[:, corner - 1], axis=0)
+        np.maximum.at(size, faces[:, corner], np.hypot(side[:, 0], side[:, 1]))
+    back = np.hypot(*(uv - start).T) > _FAR * size
+    back[faces[bad]] = True
+    uv[back] = start[back]
+    return uv, _turned(uv, faces, turns)
 
 
 def _turned(uv: Floats, faces: Ints, turns: Floats) -> Bools:
     a, b, c = (uv.take(column, axis=0) for column in faces.T)
     one, other = b - a, c - a
     area = one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0]
-    size = (one * one).sum(axis=1) + (other * other).sum(axis=1)
-    return np.asarray((turns != 0) & (area * np.sign(turns) <= _THIN * size))
+    return np.asarray((turns != 0) & (area * np.sign(turns) <= 0))
 
 
 def areas_of(uv: Floats) -> Floats:
