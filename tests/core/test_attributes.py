@@ -56,7 +56,8 @@ def test_uv_is_what_the_surface_had_and_nothing_is_turned_over(ratio: float) -> 
 
 def test_linear_values_stay_linear() -> None:
     vertices, faces = sheet(20, 20)
-    result = simplify(vertices, faces, ratio=0.1, attributes={"heat": vertices @ [1.0, 2.0, 3.0], "uv": vertices[:, :2]})
+    result = simplify(vertices, faces, ratio=0.1, attributes={"heat": vertices @ [1.0, 2.0, 3.0],
+                                                             "uv": vertices[:, :2]})
     assert np.allclose(result.attributes["heat"], result.vertices @ [1, 2, 3])
     assert np.allclose(result.attributes["uv"], result.vertices[:, :2])
 
@@ -186,7 +187,8 @@ def test_bad_attributes_are_refused(attributes: dict, words: str) -> None:
 
 @pytest.mark.parametrize("options", [
     {"seam_lines": "maybe"}, {"line_toll": 0}, {"line_weight": -1}, {"symmetry": "w"}, {"locked": [1, 2]},
-    {"importance": np.full(len(VERTICES), np.nan)}, {"attributes": {}, "edges": [[0, 10**6]], "locked": VERTICES[:, 0] > 0},
+    {"importance": np.full(len(VERTICES), np.nan)},
+    {"attributes": {}, "edges": [[0, 10**6]], "locked": VERTICES[:, 0] > 0},
 ])
 def test_bad_options_are_refused(options: dict) -> None:
     with pytest.raises(MeshError):
