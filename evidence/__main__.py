@@ -7,6 +7,7 @@ import argparse
 import datetime
 import json
 import os
+import shutil
 import sys
 import tempfile
 import time
@@ -44,6 +45,7 @@ def main(words: Sequence[str] | None = None) -> int:
     folder = os.environ.get("MODELS") or None
     parser.add_argument("--models", type=Path, default=folder, help="folder with the papers' models (default: $MODELS)")
     parser.add_argument("--out", type=Path, default=Path("out/papers"), help="(default: out/papers)")
+    parser.add_argument("--docs", type=Path, help="put papers.md and its pictures there too")
     parser.add_argument("--short", action="store_true", help="the cow alone, at two levels")
     told = parser.parse_args(words)
     if told.models is not None and not Path(told.models).is_dir():
@@ -53,7 +55,11 @@ def main(words: Sequence[str] | None = None) -> int:
     def say(text: str) -> None:
         print(f"[{time.monotonic() - start:5.0f} s] {text}", flush=True)
 
-    return run(told.models and Path(told.models), told.out, say, short=told.short)
+    status = run(told.models and Path(told.models), told.out, say, short=told.short)
+    if told.docs:
+        shutil.copy(told.out / "papers.md", told.docs)
+        shutil.copytree(told.out / "images", told.docs / "images", dirs_exist_ok=True)
+    return status
 
 
 def run(folder: Path | None, out: Path, say: Callable[[str], None], *, short: bool = False) -> int:

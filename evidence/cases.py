@@ -17,8 +17,8 @@ from benchmarks.peers import PEERS
 from benchmarks.readers import Mesh
 from benchmarks.worker import Worker
 
-SAMPLES = 30_000  # each way
-FEW_SAMPLES = 12_000  # where geometric means over many cases are wanted
+SAMPLES = 16_000  # each way
+FEW_SAMPLES = 6_000  # where geometric means over many cases are wanted
 TIMEOUT = 300.0
 
 PAPER = {"preset": "paper"}

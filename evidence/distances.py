@@ -94,7 +94,7 @@ def _plot(context: Context, found: Found, figure: str, what: str) -> Plot:
             points = [(percent, getattr(found[model.name, name, percent][1], figure)) for percent in context.percent
                       if (model.name, name, percent) in found]
             if points:
-                line(axes, *zip(*points), name)
+                line(axes, [percent for percent, _ in points], [value for _, value in points], name)
         if figure == "backward_max" and model.name in DISTANCES:
             for place, (name, color) in enumerate((("CF", "#c77d20"), ("ESO 3", "#2f74b5")), 1):
                 line(axes, context.percent, [DISTANCES[model.name][p][place] for p in context.percent],

@@ -16,7 +16,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from PIL import Image, ImageDraw, ImageFont
 
-SMALL = 1500  # pixels across, of a strip of pictures in Markdown
+SMALL = 1200  # pixels across, of a strip of pictures in Markdown
 
 
 @dataclass(frozen=True)
@@ -192,7 +192,7 @@ def _markdown(folder: Path, title: str, lead: str, sections: Sequence[Section]) 
                 if isinstance(block, Plot):
                     block.figure.savefig(images / name, dpi=80)
                 else:
-                    strip(block).save(images / name, quality=80, optimize=True)
+                    strip(block).save(images / name, quality=74, optimize=True)
                 parts += [f"![{re.sub(r'[*`]', '', block.caption)}](images/{name})", block.caption]
     return "\n\n".join(parts) + "\n"
 

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import matplotlib as mpl
 from matplotlib.axes import Axes
@@ -39,5 +40,5 @@ def line(axes: Axes, x: Sequence[float], y: Sequence[float], label: str, *, prin
          color: str | None = None) -> None:
     """Draw a line with marks: whole for what was measured, dashed and hollow for what a paper prints."""
     shade = color or COLORS.get(label, "#1d2733")
-    style = {"linestyle": "--", "marker": "o", "markerfacecolor": "white"} if printed else {"marker": "o"}
-    axes.plot(x, y, label=label, color=shade, linewidth=1.6, markersize=4, **style)
+    style: dict[str, Any] = {"linestyle": "--", "markerfacecolor": "white"} if printed else {}
+    axes.plot(x, y, label=label, color=shade, linewidth=1.6, marker="o", markersize=4, **style)

@@ -7,7 +7,7 @@ import numpy as np
 
 from .context import Context
 from .models import Model
-from .page import Pictures, Section, Table
+from .page import Cell, Pictures, Section, Table
 
 STOPS = np.array([[0.10, 0.60, 0.24], [0.62, 0.78, 0.22], [0.98, 0.82, 0.16], [0.93, 0.45, 0.12], [0.80, 0.09, 0.10]])
 RINGS = (1, 3)
@@ -31,7 +31,7 @@ def section(context: Context) -> Section:
         "red where it varies most (by the logarithm, from the 5th to the 95th percentile of each picture). One ring is "
         "the shape operator of Equation 7; three rings spread it over what a vertex comes to stand for.")
     part.raw = []
-    rows = []
+    rows: list[list[Cell]] = []
     for model in context.eso_models[: 1 if context.short else None]:
         pictures = []
         for rings in RINGS:
