@@ -11,7 +11,7 @@ from .worker import GRACE_SECONDS, Steps, Worker, run_to_end
 
 _POLL_SECONDS = 0.01
 # Each picture of the bar costs a redraw, which window and engine wait for.
-_SHOW_SECONDS = 0.5
+_SHOW_SECONDS = 1.0
 # What the user may go on doing while the engine works; anything else could change the source under it.
 _VIEW_EVENTS = {"MIDDLEMOUSE", "WHEELUPMOUSE", "WHEELDOWNMOUSE", "MOUSEMOVE", "TRACKPADPAN", "TRACKPADZOOM"}
 
