@@ -1,19 +1,22 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The meshes that get levels: each read once, however many objects show it, and its levels written once."""
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import bpy
 import numpy as np
 
 from ..core.chains import Chain
+from ..core.mesh import MeshError
 from . import level_info
 from .fingerprint import fingerprint, modifier_settings
 from .level_names import take_name
 from .modifiers import live_modifiers, switched_off
 from .place_levels import LevelMesh, note_materials
 from .read_mesh import MeshArrays, read_mesh
+from .regions import group_options
 from .write_mesh import write_mesh
 
 
@@ -93,7 +96,25 @@ def _volume(obj: bpy.types.Object) -> float:
     return abs(float(np.linalg.det(np.array(obj.matrix_world, np.float64)[:3, :3])))
 
 
-def write_chain(source: LodSource, chain: Chain, names: Sequence[str]) -> list[LevelMesh]:
+def engine_inputs(source: LodSource, group: Mapping[str, Any]) -> dict[str, Any]:
+    """Give what the engine takes besides the user's options: what the mesh carries, and a vertex group's weights."""
+    arrays = source.arrays
+    if not group or arrays.groups is None or group["vertex_group"] not in arrays.groups.names:
+        return arrays.carried
+    chosen = group_options(arrays, group["vertex_group"], use=group["group_use"], factor=group["group_factor"],
+                           invert=group["invert_group"])
+    return {**arrays.carried, **chosen}
+
+
+def check_group(sources: Sequence[LodSource], group: Mapping[str, Any]) -> None:
+    """Make sure that at least one of several meshes has the vertex group that is asked for."""
+    name = group.get("vertex_group", "")
+    if name and not any(source.arrays.groups and name in source.arrays.groups.names for source in sources):
+        raise MeshError(f"there is no vertex group '{name}': choose another, or none")
+
+
+def write_chain(source: LodSource, chain: Chain, names: Sequence[str],
+                writing: Mapping[str, Any] | None = None) -> list[LevelMesh]:
     """Make the meshes of a chain, the finest first, with what is told of each but for its source.
 
     Parameters
@@ -102,6 +123,8 @@ def write_chain(source: LodSource, chain: Chain, names: Sequence[str]) -> list[L
     chain : Chain
     names : sequence of str
         Of the meshes.
+    writing : mapping, optional
+        Options of `write_mesh`.
     """
     written: list[LevelMesh] = []
     before = len(source.arrays.triangles)
@@ -111,7 +134,7 @@ def write_chain(source: LodSource, chain: Chain, names: Sequence[str]) -> list[L
         if last is not None and last.properties[level_info.TRIANGLES] == after:
             mesh = last.mesh  # a budget left this mesh as it was
         else:
-            mesh = write_mesh(level.result, source.arrays, name)
+            mesh = write_mesh(level.result, source.arrays, name, **(writing or {}))
             note_materials(mesh)
         short = "" if level.result.reached else level.result.messages[-1]
         told = level_info.level_properties(source.objects[0], number, before, after, level.result.error,

@@ -5,7 +5,16 @@ import bpy
 
 from ..bridge import level_info, objects
 from ..bridge.instances import instancers, place_instances
-from ..bridge.lod_sources import LodSource, meshes_behind, name_meshes, read_sources, told_of, write_chain
+from ..bridge.lod_sources import (
+    LodSource,
+    check_group,
+    engine_inputs,
+    meshes_behind,
+    name_meshes,
+    read_sources,
+    told_of,
+    write_chain,
+)
 from ..bridge.place_levels import Place, place_levels, plan_places
 from ..core.chains import Chain, chains_steps
 from ..core.mesh import MeshError
@@ -40,6 +49,7 @@ class OBJECT_OT_eso_lod_generate(EngineOperator, LodOptions, bpy.types.Operator)
         """Draw the redo panel."""
         self.layout.use_property_split = True
         self.draw_levels(self.layout)
+        self.draw_keep(self.layout)
         self.draw_engine(self.layout)
 
     def prepare(self, context: bpy.types.Context) -> Steps[list[Chain]]:
@@ -59,7 +69,9 @@ class OBJECT_OT_eso_lod_generate(EngineOperator, LodOptions, bpy.types.Operator)
             everyone, len(goals.values), name, collection=self.collection, replace=self.replace
         )
         meshes = [(source.arrays.vertices, source.arrays.triangles) for source in self._sources]
-        options = [self._settings.options(source.arrays.carried) for source in self._sources]
+        check_group(self._sources, self._settings.group)
+        inputs = [engine_inputs(source, self._settings.group) for source in self._sources]
+        options = [self._settings.options(own) for own in inputs]
         return chains_steps(meshes, goals, options, [len(source.objects) for source in self._sources])
 
     def finish(self, context: bpy.types.Context, result: list[Chain]) -> None:
@@ -68,7 +80,7 @@ class OBJECT_OT_eso_lod_generate(EngineOperator, LodOptions, bpy.types.Operator)
         made: list[bpy.types.Object] = []
         for source, chain in zip(self._sources, result, strict=True):
             names = place_of[source.objects[0]].names
-            levels = write_chain(source, chain, names)
+            levels = write_chain(source, chain, names, self._settings.writing)
             settings = level_info.settings_text(
                 self._settings.stored([len(level.result.faces) for level in chain.levels])
             )

@@ -9,7 +9,7 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty
 
 from ..bridge import level_info
-from ..bridge.lod_sources import LodSource, read_sources, told_of, write_chain
+from ..bridge.lod_sources import LodSource, engine_inputs, read_sources, told_of, write_chain
 from ..bridge.place_levels import put_mesh
 from ..core.chains import Chain, chains_steps
 from ..core.mesh import MeshError
@@ -64,7 +64,8 @@ class OBJECT_OT_eso_lod_update(EngineOperator, bpy.types.Operator):
         """Put the new meshes in the place of the old ones."""
         lines, notes = [], []
         for (source, settings), chain in zip(self._sources, result, strict=True):
-            new = write_chain(source, chain, [f"{source.objects[0].name} new"] * len(chain.levels))
+            new = write_chain(source, chain, [f"{source.objects[0].name} new"] * len(chain.levels),
+                              settings.writing)
             stored = level_info.settings_text(settings.stored([]))
             for obj in source.objects:
                 own = [told_of(level, obj, stored, settings.profile) for level in new]
@@ -87,7 +88,7 @@ class OBJECT_OT_eso_lod_update(EngineOperator, bpy.types.Operator):
         chains: list[Chain] = []
         for number, (source, settings) in enumerate(self._sources):
             mesh = source.arrays.vertices, source.arrays.triangles
-            steps = chains_steps([mesh], settings.goals(), [settings.options(source.arrays.carried)])
+            steps = chains_steps([mesh], settings.goals(), [settings.options(engine_inputs(source, settings.group))])
             chains += yield from scaled(steps, lambda part, number=number: (number + part) / len(self._sources))
         return chains
 

@@ -38,14 +38,15 @@ class OBJECT_OT_eso_simplify(EngineOperator, SimplifyOptions, bpy.types.Operator
         """Need an active mesh object."""
         return poll_with(cls, why_not_simplify(context))
 
-    def draw(self, context: bpy.types.Context) -> None:
+    def draw(self, _context: bpy.types.Context) -> None:
         """Draw the redo panel."""
         self.layout.use_property_split = True
         self.draw_target(self.layout)
         self.layout.prop(self, "in_place")
         if self.in_place:
             self.layout.prop(self, "all_users")
-        self.draw_regions(self.layout, context.active_object)
+        self.layout.prop(self, "only_selected")
+        self.draw_keep(self.layout)
         self.draw_engine(self.layout)
 
     def prepare(self, context: bpy.types.Context) -> Steps[list[SimplifyResult]]:

@@ -7,6 +7,7 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
 from ..core.mesh import MeshError
+from .keep_options import KeepOptions
 from .lod_record import LodSettings, ordered_goals
 from .options import EngineOptions
 from .profiles import PROFILES
@@ -27,7 +28,7 @@ _LIST_OF = {"ratio": "ratios", "count": "faces_targets", "error": "max_errors", 
 _PROFILES = tuple((name, profile.label, f"Names and layout for {profile.label}") for name, profile in PROFILES.items())
 
 
-class LodOptions(EngineOptions):
+class LodOptions(EngineOptions, KeepOptions):
     """A chain of levels."""
 
     levels_by: EnumProperty(name="Levels By", items=_LEVELS_BY, default="ratio")
@@ -137,6 +138,8 @@ class LodOptions(EngineOptions):
             apply_modifiers=self.apply_modifiers,
             live=[name for name, is_live in live.items() if is_live],
             profile=self.profile,
+            group=self.group_settings(),
+            writing=self.writing(),
         )
 
 

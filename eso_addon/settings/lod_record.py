@@ -2,7 +2,7 @@
 """How levels were made, as plain data that is stored with them and makes them again."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from ..core.chains import Goals
@@ -29,6 +29,10 @@ class LodSettings:
         Kinds of modifiers that stay live nevertheless.
     profile
         A key of `PROFILES`.
+    group
+        The vertex group that protects or favours, and how; empty for none.
+    writing
+        Options of `write_mesh`.
     """
 
     kind: str
@@ -38,6 +42,8 @@ class LodSettings:
     apply_modifiers: bool
     live: Sequence[str]
     profile: str
+    group: Mapping[str, Any] = field(default_factory=dict)
+    writing: Mapping[str, Any] = field(default_factory=dict)
 
     @classmethod
     def read(cls, data: Mapping[str, Any] | None) -> "LodSettings":

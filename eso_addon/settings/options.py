@@ -6,9 +6,10 @@
 from typing import Any
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
 
 from ..core.screen import Screen
+from .keep_options import KeepOptions
 
 _TARGETS = (
     ("ratio", "Ratio", "Keep this share of the triangles"),
@@ -26,10 +27,6 @@ _SYMMETRIES = (
     ("x", "X", "A mesh that is symmetric over X stays so"),
     ("y", "Y", "A mesh that is symmetric over Y stays so"),
     ("z", "Z", "A mesh that is symmetric over Z stays so"),
-)
-_GROUP_USES = (
-    ("favour", "Favour", "Errors count for more where the group's weight is high"),
-    ("protect", "Protect", "Vertices whose weight is at least one half are not touched"),
 )
 _METHODS = (
     ("eso", "ESO", "Extended second-order weights: features by the surface variation within several rings"),
@@ -129,7 +126,7 @@ class EngineOptions:
 _TARGET_NAMES = {"ratio": "ratio", "count": "faces_target", "error": "max_error", "screen": "max_error"}
 
 
-class SimplifyOptions(EngineOptions):
+class SimplifyOptions(EngineOptions, KeepOptions):
     """One simplified version."""
 
     target: EnumProperty(name="Target", items=_TARGETS, default="ratio")
@@ -164,25 +161,9 @@ class SimplifyOptions(EngineOptions):
         name="Lens", description="Focal length in millimetres, on a sensor 36 mm wide", default=50.0, min=1.0,
         soft_max=250.0
     )
-    vertex_group: StringProperty(name="Vertex Group", description="Protects or favours painted regions", default="")
-    group_use: EnumProperty(name="Group", items=_GROUP_USES, default="favour")
-    group_factor: FloatProperty(
-        name="Factor", description="How many times more errors count at full weight", default=10.0, min=0.0,
-        soft_max=100.0
-    )
-    invert_group: BoolProperty(name="Invert", description="Use one less the weight", default=False)
     only_selected: BoolProperty(
         name="Only Selected", description="In Edit Mode, simplify the selected faces and leave the others",
         default=True
-    )
-    join_quads: BoolProperty(
-        name="Join Quads", description="Join the triangles of changed quads again; unchanged polygons always stay",
-        default=False
-    )
-    keep_loose: BoolProperty(name="Keep Loose", description="Keep points and edges without faces", default=True)
-    influences: IntProperty(
-        name="Influences", description="Bones that may move a vertex; -1: as many as in the source, 0: any number",
-        default=-1, min=-1, soft_max=8
     )
     in_place: BoolProperty(name="In Place", description="Replace the object's own mesh", default=False)
     all_users: BoolProperty(
@@ -198,26 +179,9 @@ class SimplifyOptions(EngineOptions):
         for name in names if self.target == "screen" else (_TARGET_NAMES[self.target],):
             layout.prop(self, name)
 
-    def draw_regions(self, layout: bpy.types.UILayout, obj: bpy.types.Object | None) -> None:
-        """Draw what is protected, and what becomes of polygons and weights."""
-        if obj is not None:
-            layout.prop_search(self, "vertex_group", obj, "vertex_groups")
-        if self.vertex_group:
-            layout.prop(self, "group_use")
-            if self.group_use == "favour":
-                layout.prop(self, "group_factor")
-            layout.prop(self, "invert_group")
-        for name in ("only_selected", "join_quads", "keep_loose", "influences"):
-            layout.prop(self, name)
-
     def screen(self) -> Screen:
         """Give the picture in which an error is judged."""
         return Screen(resolution=self.resolution, lens=self.lens, pixels=self.pixel_error)
-
-    def writing(self) -> dict[str, Any]:
-        """Give the options of `write_mesh`."""
-        return {"join_quads": self.join_quads, "keep_loose": self.keep_loose,
-                "influences": None if self.influences < 0 else self.influences}
 
     def simplify_target(self) -> dict[str, Any]:
         """Give the target as `simplify` takes it."""

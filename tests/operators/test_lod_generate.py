@@ -294,3 +294,20 @@ def test_a_level_out_of_reach_is_no_copy_and_says_what_would_help() -> None:
     assert [o["eso_triangles"] for o in level_objects()] == [100, 8]
     assert "stopped at 8 of 6" in level_objects()[1]["eso_message"]
     assert "pruning at" in bpy.context.window_manager.eso_last_run.lines
+
+
+def test_a_vertex_group_protects_those_that_have_it() -> None:
+    one, other = add_sphere("One", 3), add_sphere("Other", 3)
+    held = [vertex.index for vertex in one.data.vertices if vertex.co.z > 0.5]
+    one.vertex_groups.new(name="Face").add(held, 1.0, "REPLACE")
+    places = {tuple(one.data.vertices[index].co) for index in held}
+    activate(one, other)
+    generate(ratios="0.6", vertex_group="Face", group_use="protect")
+    found = {name: {tuple(v.co) for v in bpy.data.objects[name].data.vertices} for name in ("One_LOD0", "Other_LOD0")}
+    assert places <= found["One_LOD0"]
+    assert not places <= found["Other_LOD0"]
+    bpy.ops.object.eso_lod_update(only_stale=False)
+    assert places <= {tuple(v.co) for v in bpy.data.objects["One_LOD0"].data.vertices}
+    activate(one, other)
+    with pytest.raises(RuntimeError, match="no vertex group 'Nose'"):
+        generate(ratios="0.6", vertex_group="Nose")
