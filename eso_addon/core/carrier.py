@@ -71,7 +71,27 @@ class Carrier:
         held[survivor.compress(self._held)] = True  # those that are gone write beyond the end
         return held[:-1]
 
-    def carry(self, placed: Floats, corners: Ints, face_map: Ints, survivor: Ints) -> Carried:
+    @property
+    def flips(self) -> bool:
+        """Whether edges may flip: a UV map's triangles could turn over."""
+        return not any(layer.kind == "uv" for layer in self._attributes.layers)
+
+    def sheets(self, face_map: Ints) -> Ints | None:
+        """Return the connected part of the input that each face is in, None where the weld joined none."""
+        return None if self._mesh.sheet is None else self._mesh.sheet.take(self._vertex[0].take(face_map))
+
+    def bound(self, survivor: Ints, count: int) -> Bools:
+        """Tell the level's vertices, (count,) bool, between which edges must not flip: they carry a line or a value."""
+        marked = self._held.copy()
+        for layer in self._own.on("edge"):
+            ends = self._mesh.vertex.take(self._own.edges[(layer.rows != 0).any(axis=1)])
+            marked[ends[ends >= 0]] = True
+        bound = np.zeros(count + 1, bool)
+        bound[survivor.compress(marked)] = True  # those that are gone write beyond the end
+        return bound[:-1]
+
+    def carry(self, placed: Floats, corners: Ints, face_map: Ints, survivor: Ints,
+              slots: Ints | None = None) -> Carried:
         """Put everything on a level.
 
         Parameters
@@ -84,6 +104,8 @@ class Carrier:
             The engine's face of each.
         survivor : ndarray, (engine's vertices,) int64
             The level's vertex that each has become, -1 if it is gone.
+        slots : ndarray, (f, 3) int64, optional
+            Where edges have flipped: for each corner the one that it was before, as 3 * face + number.
         """
         survivor = np.where(survivor < 0, len(placed), survivor)
         if self._mirror is not None:
@@ -99,6 +121,8 @@ class Carrier:
         if self._mesh.turned is not None:
             rows[1:, self._mesh.turned[face_map]] = [[2], [1]]
         slot = (rows * self._lines.faces.shape[1] + face_map).T.ravel()
+        if slots is not None:
+            slot = slot.take(slots.ravel())
         target = places.target.ravel().take(slot)
         number, wedge_of, vertex_map = self._part(places, slot, target)
         unmoved = (self._points.take(self._lines.faces.ravel().take(slot), axis=1)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""From the engine's record to finished meshes: a level in the input's numbers, refitted, and the level for an error."""
+"""From the engine's record to finished meshes: a level in the input's numbers, refitted."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from .carrier import Carrier
 from .closest import ClosestPoints
-from .deviation import measure
 from .mesh import Floats, Ints
 from .options import Options
 from .prepare import Prepared
@@ -23,9 +22,6 @@ Mesh = tuple[Floats, Ints]
 
 # points on each surface where levels are compared
 _PROBES = 8192
-# a maximum error is sought with probes until this part of it is used; more of them may find a little more
-_MARGIN = 0.9
-_ENOUGH = 0.75
 
 
 @dataclass(frozen=True)
@@ -39,7 +35,7 @@ class SimplifyResult:
     vertex_map : ndarray, (n,) int32
         The vertex that each input vertex has become, -1 if it is gone.
     face_map : ndarray, (m,) int32
-        The input face that each face comes from.
+        The input face that each face comes from; of two whose edge has flipped, either.
     reached : bool
         Whether the target was reached.
     messages : tuple of str
@@ -66,7 +62,7 @@ class SimplifyResult:
     @cached_property
     def error(self) -> float:
         """Largest distance between both surfaces at thousands of probes, in the mesh's units; `measure` takes more."""
-        return _Probes(self.original).deviation(self)
+        return Probes(self.original).deviation(self)
 
 
 def in_input_units(record: CollapseRecord, mesh: Prepared, vertices: Floats) -> CollapseRecord:
@@ -93,21 +89,33 @@ def level(mesh: Prepared, record: CollapseRecord, original: Mesh, length: int,
     corners, placed = number.take(corners), points.take(alive, axis=0)
     merged = number.take(survivor)  # of the engine's vertices
     vertex_map = np.where(mesh.vertex >= 0, merged.take(mesh.vertex, mode="clip"), -1)
+    slots = np.arange(corners.size).reshape(corners.shape)  # of the corners before edges flip
     if options.refit and options.moves and length:
         # the engine's vertices stand for the input's, so that seams stay closed
-        placed = refit(placed, corners, vertices[mesh.source], mesh.faces.T, vertex_map=merged,
-                       fixed=None if carrier is None else carrier.held(merged, len(placed)))
+        placed, slots = refit(
+            placed, corners, vertices[mesh.source], mesh.faces.T, vertex_map=merged,
+            fixed=None if carrier is None else carrier.held(merged, len(placed)),
+            bound=None if carrier is None else carrier.bound(merged, len(placed)),
+            group=_sheets(mesh, faces, face_map) if carrier is None else carrier.sheets(face_map),
+            flips=options.flips and (carrier is None or carrier.flips))
+        corners = corners.ravel().take(slots)
     if carrier is not None:
-        carried = carrier.carry(placed, corners, face_map, merged)
+        carried = carrier.carry(placed, corners, face_map, merged, slots)
         messages = (*mesh.messages, *carrier.messages)
         return SimplifyResult(carried.points, carried.corners.astype(np.int32), carried.vertex_map.astype(np.int32),
                               carried.face_map.astype(np.int32), True, messages, record, original,
                               carried.attributes, carried.edges.astype(np.int32))
     face_map = mesh.face[face_map]
     if mesh.sheet is not None:
-        placed, corners, vertex_map = _split(mesh.sheet, faces[face_map], placed, corners, vertex_map)
+        before = faces[face_map].ravel().take(slots)
+        placed, corners, vertex_map = _split(mesh.sheet, before, placed, corners, vertex_map)
     return SimplifyResult(placed, corners.astype(np.int32), vertex_map.astype(np.int32), face_map.astype(np.int32),
                           True, mesh.messages, record, original)
+
+
+def _sheets(mesh: Prepared, input_faces: Ints, face_map: Ints) -> Ints | None:
+    """Return the connected part of the input that each of the engine's faces is in, None where the weld joined none."""
+    return None if mesh.sheet is None else mesh.sheet.take(input_faces[mesh.face[face_map], 0])
 
 
 def _split(sheet: Ints, input_corners: Ints, points: Floats, corners: Ints,
@@ -132,35 +140,7 @@ def judge_count(result: SimplifyResult, target: int, options: Options) -> Simpli
     return replace(result, reached=False, messages=(*result.messages, message))
 
 
-def within(mesh: Prepared, record: CollapseRecord, original: Mesh, limit: float,
-            options: Options, carrier: Carrier | None = None) -> SimplifyResult:
-    """Find a long prefix of the record whose measured deviation stays within a limit.
-
-    The costs are no distances, so the deviation is measured: with probes while the prefix is sought, and at the end as
-    `measure` does it.
-    """
-    plain = replace(options, refit=False)
-    probes = _Probes(original)
-    low, high = 0, len(record)
-    while low < high:
-        middle = (low + high + 1) // 2
-        deviation = probes.deviation(level(mesh, record, original, middle, plain))
-        if deviation > _MARGIN * limit:
-            high = middle - 1
-            continue
-        low = middle
-        if deviation > _ENOUGH * limit:
-            break
-    while low:
-        for chosen in (options, plain) if options.refit else (plain,):
-            result = level(mesh, record, original, low, chosen, carrier)
-            if measure(*original, result.vertices, result.faces).symmetric.maximum <= limit:
-                return result
-        low = max(low - (mesh.faces.shape[1] - low) // 20 - 1, 0)
-    return level(mesh, record, original, 0, plain, carrier)
-
-
-class _Probes:
+class Probes:
     """Points spread over an original, to bound the deviation of many levels quickly."""
 
     def __init__(self, original: Mesh) -> None:
@@ -169,6 +149,7 @@ class _Probes:
         self.points = _thin(np.concatenate((vertices[np.unique(faces)], vertices[faces].mean(axis=1))))
 
     def deviation(self, level: SimplifyResult) -> float:
+        """Return the largest distance that the probes find, either way."""
         corners = level.vertices[level.faces]
         middles = (corners + np.roll(corners, 1, axis=1)).reshape(-1, 3) / 2
         points = _thin(np.concatenate((level.vertices, corners.mean(axis=1), middles)))

@@ -52,6 +52,8 @@ class Options:
         Drop connected parts whose bounding box has a smaller diagonal, in the mesh's units.
     refit : bool
         Move the survivors afterwards so that the surface fits the original; only with optimal placement.
+    flips : bool
+        Let a refit flip edges too, where that brings the surface nearer.
     attributes : mapping of str to array_like or Attribute, optional
         What the mesh carries; see `attributes.check_attributes`.
     edges : array_like, (e, 2) int, optional
@@ -82,7 +84,7 @@ class Options:
     weight_power: float = 0.5
     area_weighted: bool = True
     boundary_weight: float = 10.0
-    memory: float = 1e-9
+    memory: float = 1e-11
     flip: float = 0.5
     share: float = 0.5
     spread: float = 3.0
@@ -90,6 +92,7 @@ class Options:
     weld: bool = True
     prune: float = 0.0
     refit: bool = True
+    flips: bool = True
     attributes: Mapping[str, ArrayLike | Attribute] | None = None
     edges: ArrayLike | None = None
     seam_lines: str = "kept"

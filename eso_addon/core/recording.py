@@ -10,9 +10,10 @@ from typing import Any, TypeVar
 from .blocks import Blocks
 from .carrier import Carrier
 from .collapse import collapse_steps
+from .error_limit import within
 from .feature_collapse import guide_for
 from .guidance import guidance_of
-from .levels import Mesh, SimplifyResult, in_input_units, judge_count, level, within
+from .levels import Mesh, SimplifyResult, in_input_units, judge_count, level
 from .options import Options
 from .prepare import Prepared, prepare
 from .record import CollapseRecord

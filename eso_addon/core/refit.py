@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Moves the vertices of a simplified mesh so that its surface fits samples of the original one."""
+"""Moves the vertices and flips the edges of a simplified mesh so that its surface fits samples of the original one."""
 
 from __future__ import annotations
 
@@ -11,16 +11,17 @@ from numpy.typing import NDArray
 
 from .adjacency import boundary_vertices, sorting_order, stars
 from .closest import ClosestPoints, closest_in_triangles, squared_distances, triangle_frames
+from .flips import flip_edges
 from .normals import face_area_vectors, face_areas, face_normals, lengths
 
 Bools = NDArray[np.bool_]
 Floats = NDArray[Any]  # float64, or float32 where only a choice hangs on it
 Ints = NDArray[np.int64]
 
-_ROUNDS = 2
-_PER_FACE = 10  # samples wanted for each simplified face,
+_ROUNDS = 5
+_PER_FACE = 15  # samples wanted for each simplified face,
 _LEAST = 5000  # and at least so many in all: they are soon done, and miss nothing of a small mesh
-_DAMPING = 0.3  # pull towards the present position, relative to what evenly spread samples weigh
+_DAMPING = 0.2  # pull towards the present position, relative to what evenly spread samples weigh
 _TILT = 0.03  # weight of a tilt against the original's normal, times an edge, beside that of a distance
 _AGREE = 0.5  # least cosine between a sample's normal and its face's for the tilt to count
 _STEPS = 4  # of conjugate gradients: each round starts near the answer, more change nothing
@@ -40,13 +41,17 @@ def refit(
     *,
     vertex_map: Ints | None = None,
     fixed: Bools | None = None,
+    bound: Bools | None = None,
+    group: Ints | None = None,
     rounds: int = _ROUNDS,
-) -> Floats:
-    """Fit a simplified mesh to its original by moving its vertices.
+    flips: bool = True,
+) -> tuple[Floats, Ints]:
+    """Fit a simplified mesh to its original by moving its vertices and flipping its edges.
 
     Each round finds the closest point on the simplified surface for samples of the original, then solves a damped
     least squares for the positions with those correspondences held (Hoppe et al. 1993, Mesh optimization, section 4.1).
-    No face flips or turns into a sliver, and the largest distance of a sample does not rise.
+    Between two rounds, edges flip where that brings the surface nearer. No face turns over or into a sliver, and the
+    largest distance of a sample does not rise.
 
     Parameters
     ----------
@@ -58,29 +63,42 @@ def refit(
         The simplified vertex each original vertex was collapsed into, -1 if none: spares a search over the mesh.
     fixed : (k,) bool, optional
         Vertices that must stay; boundary vertices always do.
+    bound, group : optional
+        Edges that must stay: see `flips.flip_edges`.
     rounds : int
+    flips : bool
+        Without them the triangles stay what they are.
 
     Returns
     -------
-    (k, 3) float64
+    vertices : (k, 3) float64
         The new positions; fixed vertices have theirs bit for bit.
+    corner : (m, 3) int64
+        For each corner of the new faces the corner of the given ones that it was, as 3 * face + number.
     """
+    corner = np.arange(faces.size).reshape(faces.shape)
     held = boundary_vertices(faces, len(vertices))
     if fixed is not None:
         held |= fixed
-    if len(faces) == 0 or rounds < 1 or held.all() or not face_area_vectors(original_vertices, original_faces).any():
-        return vertices.copy()
+    flat = not face_area_vectors(original_vertices, original_faces).any()
+    if len(faces) == 0 or rounds < 1 or flat or (held.all() and not flips):
+        return vertices.copy(), corner
     # unit size and the origin in the middle keep the precision of small parts of large scenes
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     center, size = (low + high) / 2, float((high - low).max()) or 1.0
-    samples, weights, corner, normals = _samples(original_vertices, original_faces, max(_PER_FACE * len(faces), _LEAST))
+    samples, weights, near, normals = _samples(original_vertices, original_faces, max(_PER_FACE * len(faces), _LEAST))
     # single precision decides which face is near: it takes half the time, and positions are solved in double
     exact = np.ascontiguousarray(((samples - center) / size).T)
     points = exact.astype(np.float32)
     start = (vertices - center) / size
-    face = _first_faces(start, faces, points, None if vertex_map is None else vertex_map.take(corner))
-    moved = _fit(start, faces, _Samples(exact, points, weights, normals), face, held, rounds)
-    return np.where((moved == start).all(axis=1)[:, None], vertices, moved * size + center)
+    face = _first_faces(start, faces, points, None if vertex_map is None else vertex_map.take(near))
+    fit = _Fit(start, faces, corner, _Samples(exact, points, weights, normals), face, held)
+    for done in range(rounds):
+        fit.move()
+        if flips and done < rounds - 1:
+            fit.flip(bound, group)
+    moved = fit.vertices
+    return np.where((moved == start).all(axis=1)[:, None], vertices, moved * size + center), fit.corner
 
 
 class _Samples(NamedTuple):
@@ -121,32 +139,57 @@ def _evenly(count: int, share: float) -> Ints:
     return np.arange(kept) * count // kept
 
 
-def _fit(start: Floats, faces: Ints, samples: _Samples, face: Ints, held: Bools, rounds: int) -> Floats:
-    """Run the rounds from the samples' first faces, then take back what made the worst sample worse."""
-    points = samples.points
-    neighbors = _face_neighbors(faces, len(start))
-    now = start
-    face, squared, closest = _correspond(now, faces, points, face, neighbors)
-    # a guess goes wrong over long triangles and sharp edges: samples that seem far away are looked up exactly
-    far = np.flatnonzero(squared > _FAR * np.median(squared))
-    face[far] = ClosestPoints(now, faces).query(points.take(far, axis=1).T, hint=face[far])[1]
-    worst = 0.0
-    for done in range(rounds):
-        face, squared, closest = _correspond(now, faces, points, face, neighbors)
-        worst = worst if done else float(squared.max())
-        step = _solve(now, faces, samples, face, _barycentric(now, faces, face, closest))
-        step[held] = 0
-        now = _without_flips(now, step, faces, start)
-    share, step = np.ones(len(now)), now - start
-    for _ in range(2 * _HALVINGS):
-        face, squared, _ = _correspond(now, faces, points, face, neighbors)
-        bad = squared > worst * (1 + _SINGLE)
-        if not bad.any():
-            return now
-        back = np.unique(faces[face[bad]])
-        share[back] = np.where(share[back] > 0.5**_HALVINGS, share[back] / 2, 0)
-        now = _without_flips(start, share[:, None] * step, faces, start)
-    return start
+class _Fit:
+    """A simplified mesh on its way to its samples, each with its nearest face."""
+
+    def __init__(self, vertices: Floats, faces: Ints, corner: Ints, samples: _Samples, face: Ints, held: Bools) -> None:
+        self.vertices, self.faces, self.corner = vertices, faces, corner
+        self.samples, self.face, self.held = samples, face, held
+        self.start = vertices  # since the last flips: what faces turn against
+        self.neighbors = _face_neighbors(faces, len(vertices))
+        self._look(vertices)
+        # a guess goes wrong over long triangles and sharp edges: samples that seem far away are looked up exactly
+        far = np.flatnonzero(self.squared > _FAR * np.median(self.squared))
+        found = ClosestPoints(vertices, faces).query(samples.points.take(far, axis=1).T, hint=self.face[far])[1]
+        self.face[far] = found
+        self._look(vertices)
+        self.worst = float(self.squared.max())
+
+    def _look(self, vertices: Floats) -> None:
+        """Follow the samples' nearest faces to where the vertices now are."""
+        self.face, self.squared, self.closest = _correspond(vertices, self.faces, self.samples.points, self.face,
+                                                            self.neighbors)
+
+    def move(self) -> None:
+        """Move the vertices to where the samples pull them, but none that makes the worst sample worse."""
+        now, faces = self.vertices, self.faces
+        step = _solve(now, faces, self.samples, self.face, _barycentric(now, faces, self.face, self.closest))
+        step[self.held] = 0
+        share = np.ones(len(now))
+        for _ in range(2 * _HALVINGS):
+            self.vertices = _without_flips(now, share[:, None] * step, faces, self.start)
+            self._look(self.vertices)
+            bad = self.squared > self.worst * (1 + _SINGLE)
+            if not bad.any():
+                break
+            back = np.unique(faces[self.face[bad]])
+            share[back] = np.where(share[back] > 0.5**_HALVINGS, share[back] / 2, 0)
+        else:
+            self.vertices = now
+            self._look(now)
+        self.worst = min(self.worst, float(self.squared.max()))
+
+    def flip(self, bound: Bools | None, group: Ints | None) -> None:
+        """Flip edges where that brings the samples nearer."""
+        points, weights, normals = self.samples.points, self.samples.weights, self.samples.normals
+        corner, self.face = flip_edges(self.vertices, self.faces, points, normals, weights, self.face, self.squared,
+                                       bound=bound, group=group)
+        if np.array_equal(corner.ravel(), np.arange(corner.size)):
+            return
+        self.faces, self.corner = self.faces.ravel().take(corner), self.corner.ravel().take(corner)
+        self.start = self.vertices
+        self.neighbors = _face_neighbors(self.faces, len(self.vertices))
+        self._look(self.vertices)
 
 
 def _first_faces(vertices: Floats, faces: Ints, points: Floats, survivor: Ints | None) -> Ints:

@@ -1,0 +1,169 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The coarsest level within a largest distance from the original: sought by probes, promised by a thorough look.
+
+The engine's costs are no distances, so each level that comes into question is measured. How far the promise holds:
+docs/decisions/max-error.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from .carrier import Carrier
+from .closest import ClosestPoints
+from .levels import Mesh, Probes, SimplifyResult, level
+from .mesh import Floats, Ints
+from .normals import face_areas
+from .options import Options
+from .prepare import Prepared
+from .record import CollapseRecord
+from .sampling import edge_samples, face_samples
+
+_SEED = 1
+_SPREAD = 100_000  # points over the faces of each surface, and half as many along the edges
+_NEAR = 0.8  # faces with a sample as far as this part of the farthest are looked at closely,
+_CLOSELY = 400  # at most so many of them,
+_STEPS = 12  # at points so many to a side
+_SAFE = 0.98  # the part of the limit that a thorough look may find: what it misses is less than the rest
+_USED = 0.8  # a level that uses this part of the limit is coarse enough
+_STRIDE = 0.04  # first step from where the probes point to, as a part of the triangles
+
+
+def within(mesh: Prepared, record: CollapseRecord, original: Mesh, limit: float, options: Options,
+           carrier: Carrier | None = None) -> SimplifyResult:
+    """Find a long prefix of the record whose finished level stays within a limit.
+
+    Either a large part of the limit is used, or one more collapse would break it.
+
+    Parameters
+    ----------
+    mesh : Prepared
+    record : CollapseRecord
+    original : tuple of ndarray
+        Vertices (n, 3) float64 and faces (m, 3) int64.
+    limit : float
+        Largest distance between both surfaces, either way, in the mesh's units.
+    options : Options
+    carrier : Carrier, optional
+    """
+    search = _Search(mesh, record, original, limit, options, carrier)
+    low, high = 0, len(record) + 1  # fits; does not fit
+    best = search.at(0)
+    for length in search.first_guesses():
+        if not low < length < high:
+            continue
+        found = search.judge(length)
+        if found is None:
+            high = length
+        else:
+            low, best = length, found
+        if low and search.used >= _USED:
+            return best
+        if low and high <= len(record):
+            break
+    while high - low > 1 and search.used < _USED:
+        middle = (low + high) // 2
+        found = search.judge(middle)
+        if found is None:
+            high = middle
+        else:
+            low, best = middle, found
+    return best
+
+
+class _Search:
+    """Levels of one record, judged by their distance."""
+
+    used = 0.0  # the part of the limit that the last level within it uses
+
+    def __init__(self, mesh: Prepared, record: CollapseRecord, original: Mesh, limit: float, options: Options,
+                 carrier: Carrier | None) -> None:
+        self.mesh, self.record, self.original, self.limit = mesh, record, original, limit
+        self.options, self.carrier = options, carrier
+        self.probes = Probes(original)
+        vertices, faces = original
+        faces = faces[face_areas(vertices, faces) > 0]
+        self.closely = (vertices, faces)
+        self.vertices = vertices.take(np.unique(faces), axis=0)
+        self.spread, self.face = (_spread(vertices, faces) if len(faces) else (self.vertices, np.zeros(0, np.int64)))
+
+    def at(self, length: int, *, plain: bool = False) -> SimplifyResult:
+        """Return a level: finished, or without what takes time and moves it little."""
+        if plain:
+            return level(self.mesh, self.record, self.original, length, replace(self.options, refit=False))
+        return level(self.mesh, self.record, self.original, length, self.options, self.carrier)
+
+    def first_guesses(self) -> Iterator[int]:
+        """Yield where probes of unfinished levels point to, then lengths in wider and wider steps on both sides."""
+        low, high = 0, len(self.record)
+        while low < high:
+            middle = (low + high + 1) // 2
+            if self.probes.deviation(self.at(middle, plain=True)) > self.limit:
+                high = middle - 1
+            else:
+                low = middle
+        yield low
+        left = int(self.record.faces_left[low - 1]) if low else self.record.faces_before
+        stride = max(int(_STRIDE * left / 2), 1)
+        while stride < 2 * len(self.record):
+            yield min(low + stride, len(self.record))
+            yield max(low - stride, 0)
+            stride *= 2
+
+    def judge(self, length: int) -> SimplifyResult | None:
+        """Return the level where it is within the limit."""
+        result = self.at(length)
+        farthest = self._farthest(result)
+        if farthest > _SAFE * self.limit:
+            return None
+        self.used = farthest / self.limit if self.limit > 0 else 1.0
+        return result
+
+    def _farthest(self, result: SimplifyResult) -> float:
+        """Return the largest distance between both surfaces that a thorough look finds, or one beyond the limit."""
+        vertices, faces = result.vertices, result.faces.astype(np.int64)
+        faces = faces[face_areas(vertices, faces) > 0]
+        if len(faces) == 0:
+            return np.inf
+        end = (_SAFE * self.limit) ** 2
+        there, back = ClosestPoints(vertices, faces), self.probes.surface
+        corners = vertices.take(np.unique(faces), axis=0)
+        worst = 0.0
+        for search, points in ((there, self.probes.points), (back, corners), (there, self.vertices)):
+            worst = max(worst, float(search.query(points)[2].max(initial=0.0)))
+            if worst > end:
+                return float(np.sqrt(worst))
+        points, face = _spread(vertices, faces)
+        for search, source, some, of in ((there, self.closely, self.spread, self.face),
+                                         (back, (vertices, faces), points, face)):
+            squared = search.query(some)[2]
+            worst = max(worst, float(squared.max(initial=0.0)))
+            if worst > end:
+                break
+            squared = search.query(_close_up(*source, squared[: len(of)], of, worst))[2]
+            worst = max(worst, float(squared.max(initial=0.0)))
+        return float(np.sqrt(worst))
+
+
+def _spread(vertices: Floats, faces: Ints) -> tuple[Floats, Ints]:
+    """Return points over the faces and then along the edges, and the faces of the former."""
+    rng = np.random.default_rng(_SEED)
+    points, face, _ = face_samples(vertices, faces, _SPREAD, rng)
+    return np.concatenate([points, edge_samples(vertices, faces, _SPREAD // 2, rng)]), face
+
+
+def _close_up(vertices: Floats, faces: Ints, squared: Floats, face: Ints, worst: float) -> Floats:
+    """Return points close together on the faces with the farthest samples."""
+    far = np.flatnonzero(squared > _NEAR**2 * worst)
+    far = far.take(np.argsort(-squared.take(far), kind="stable"))
+    chosen = face.take(far)
+    chosen = chosen.take(np.sort(np.unique(chosen, return_index=True)[1]))[:_CLOSELY]
+    first, second = (x.ravel() for x in np.meshgrid(np.arange(_STEPS + 1), np.arange(_STEPS + 1)))
+    inside = first + second <= _STEPS
+    first, second = first[inside] / _STEPS, second[inside] / _STEPS
+    corners = vertices.take(faces.take(chosen, axis=0), axis=0)
+    weights = np.stack([1 - first - second, first, second], axis=1)
+    return np.einsum("pc,fcx->fpx", weights, corners).reshape(-1, 3)
