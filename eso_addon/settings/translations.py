@@ -1,20 +1,23 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Translations of everything that is seen."""
+"""Hands the translations to Blender."""
 
 import bpy
 
-LANGUAGES: dict[str, dict[str, str]] = {}
+from .texts import LANGUAGES, TEXTS
+
+# Operators' labels and the words on buttons are looked up in contexts of their own.
+_CONTEXTS = ("*", "Operator")
 
 
 def register() -> None:
-    """Hand them to Blender."""
+    """Tell Blender how everything is called in other languages."""
     table = {
-        language: {("*", text): translated for text, translated in texts.items()}
-        for language, texts in LANGUAGES.items()
+        language: {(context, text): texts[number] for text, texts in TEXTS.items() for context in _CONTEXTS}
+        for number, language in enumerate(LANGUAGES)
     }
     bpy.app.translations.register(__package__, table)
 
 
 def unregister() -> None:
-    """Take them back."""
+    """Take it back."""
     bpy.app.translations.unregister(__package__)

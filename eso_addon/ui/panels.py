@@ -276,7 +276,7 @@ def _draw_button(
     if reason and told:
         column = layout.column(align=True)
         column.active = False
-        _draw_text(column, reason, context)
+        _draw_text(column, bpy.app.translations.pgettext_iface(reason), context)
 
 
 def _draw_text(layout: bpy.types.UILayout, text: str, context: bpy.types.Context) -> None:
