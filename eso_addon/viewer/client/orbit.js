@@ -33,7 +33,7 @@ export class Orbit {
   }
 
   fit(radius) {
-    const aspect = Math.min(1, this.canvas.clientWidth / Math.max(this.canvas.clientHeight, 1)) || 1;
+    const aspect = Math.min(this.free ?? 1, this.canvas.clientWidth / Math.max(this.canvas.clientHeight, 1)) || 1;
     return (radius * 1.05) / Math.sin(Math.atan(Math.tan((this.fov ?? 35) * (Math.PI / 360)) * aspect));
   }
 

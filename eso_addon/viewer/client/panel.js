@@ -59,6 +59,12 @@ export class Panel {
     find('.settings').onchange = (event) => act.set(event.target.name, event.target.value);
   }
 
+  /** Pixels that the bar takes at the bottom, without its settings. */
+  height() {
+    const settings = this.find('.settings');
+    return this.find('.bar').offsetHeight + 14 - (settings.hidden ? 0 : settings.offsetHeight + 12);
+  }
+
   open(on) {
     this.find('.settings').hidden = !on;
     this.find('.more').setAttribute('aria-expanded', on);

@@ -30,7 +30,8 @@ canvas:focus-visible { box-shadow: inset 0 0 0 2px var(--accent); }
 .row { display: flex; align-items: center; gap: 6px; }
 button { font: inherit; color: inherit; background: none; border: 1px solid transparent; border-radius: 10px; min-width: 40px;
   min-height: 40px; padding: 0 9px; cursor: pointer; display: inline-grid; place-items: center; }
-button:hover { background: var(--track); }
+button:disabled { opacity: 0.35; cursor: default; }
+button:hover:enabled { background: var(--track); }
 button[aria-pressed=true], button[aria-expanded=true] { background: var(--accent); color: var(--edge); }
 :host(:not([dark])) button[aria-pressed=true], :host(:not([dark])) button[aria-expanded=true] { color: #fff; }
 button:focus-visible, select:focus-visible, input:focus-visible { outline: 2px solid var(--accent); outline-offset: 2px; }

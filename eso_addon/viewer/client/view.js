@@ -11,9 +11,10 @@ const CLAY = 0xb9bfc9;
 
 export class View {
   /** `drawn` is called after each picture; `moved` when the camera has moved. */
-  constructor(canvas, { drawn, moved }) {
+  constructor(canvas, { drawn, moved, below }) {
     this.canvas = canvas;
     this.drawn = drawn;
+    this.below = below; // gives the pixels that are covered at the bottom
     this.renderer = new WebGLRenderer({ canvas, antialias: true, alpha: true, powerPreference: 'high-performance' });
     this.scene = new Scene();
     this.camera = new PerspectiveCamera(35, 1, 0.1, 100);
@@ -159,8 +160,6 @@ export class View {
 
   /** Lines and shadow side for a dark or a light page. */
   theme(dark) {
-    this.lines.color.set(dark ? 0xdfe8f5 : 0x18202c);
-    this.lines.opacity = dark ? 0.28 : 0.4;
     this.sky.groundColor.set(dark ? 0x3d414d : 0x8d8f9c);
     this.sky.intensity = dark ? 0.9 : 1.15;
     this.redraw();
@@ -196,6 +195,10 @@ export class View {
     this.renderer.setPixelRatio(Math.min(window.devicePixelRatio || 1, 2));
     this.renderer.setSize(width, height, false);
     this.camera.aspect = width / height;
+    // the middle of what the bar leaves free
+    const shift = Math.min(this.below(), 0.5 * height);
+    this.camera.setViewOffset(width, height, 0, shift / 2, width, height);
+    this.orbit.free = (height - shift) / height;
     if (this.ball && !this.sized) this.orbit.frame(this.ball.center.toArray(), this.ball.radius || 1);
     this.redraw();
   }

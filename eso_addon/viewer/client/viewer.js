@@ -68,7 +68,9 @@ class EsoViewer extends HTMLElement {
     panel.find('.level').value = 1000 * settings.level;
     panel.state('loading');
     try {
-      this.view = new View(panel.canvas, { drawn: (time) => this.drawn(time), moved: () => this.look() });
+      this.view = new View(panel.canvas, {
+        drawn: (time) => this.drawn(time), moved: () => this.look(), below: () => panel.height(),
+      });
     } catch {
       panel.state('');
       panel.message('This browser cannot draw in 3D: WebGL is missing or switched off.', false);
@@ -297,6 +299,7 @@ class EsoViewer extends HTMLElement {
     this.telling = 0;
     const { state, panel, settings } = this;
     panel.figures({ ...state, pixels: this.pixels(), base: this.base ?? 1, level: state.there });
+    panel.find('.play').disabled = Boolean(this.whole);
     const all = this.whole && state.shown === state.faces;
     if (all && this.whole.identical) {
       panel.state(this.whole.quantised ? 'complete: equal to what was sent, hash checked' : 'identical to the original', true);
