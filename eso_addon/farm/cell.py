@@ -111,7 +111,8 @@ def cut_cell(folder: str, cell: int, count: int, fit: bool) -> dict[str, Any]:
     placed, corners, held = points[used], number[corners], data["locked"][used]
     if fit and length:
         merged = np.where(used[survivor], number[survivor], -1)
-        placed = refit(placed, corners, data["points"], faces, vertex_map=merged, fixed=held)
+        # no edge flips: beyond a border nobody knows whether the new one is there already
+        placed, _ = refit(placed, corners, data["points"], faces, vertex_map=merged, fixed=held, flips=False)
     if len(data["turned"]):
         turned = data["turned"][face_map]
         corners[turned, 1:] = corners[turned, :0:-1]

@@ -8,6 +8,7 @@ import time
 from typing import TextIO
 
 _WIDTH = 28
+_EACH = 200_000  # what a file costs besides its bytes, in bytes
 
 
 class Bar:
@@ -20,7 +21,7 @@ class Bar:
     """
 
     def __init__(self, files: int, size: int, out: TextIO | None = None) -> None:
-        self.files, self.size = files, max(size, 1)
+        self.files, self.size = files, max(size + files * _EACH, 1)
         self.done, self.failed, self.read = 0, 0, 0
         self.started = time.monotonic()
         self._out = out or sys.stdout
@@ -30,7 +31,7 @@ class Bar:
         """Count one file."""
         self.done += 1
         self.failed += failed
-        self.read += size
+        self.read += size + _EACH
         terminal = self._out.isatty()
         now = time.monotonic()
         if terminal or self.done == self.files or now - self._told > 10:
