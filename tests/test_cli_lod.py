@@ -187,3 +187,23 @@ def test_two_levels_of_one_name_are_refused(tmp_path: Path, capsys: pytest.Captu
     assert run("lod", tmp_path / "in.blend", tmp_path / "out.glb", *words) == 1
     assert "two objects would be named 'Tree_LOD2'" in capsys.readouterr().err
     assert not (tmp_path / "out.glb").exists()
+
+
+def test_instances_of_collections_share_their_levels(tmp_path: Path) -> None:
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    vertices, faces = ball(2)
+    mesh = bpy.data.meshes.new("Baum")
+    mesh.from_pydata(vertices, (), faces.tolist())
+    wood = bpy.data.collections.new("Wald")
+    wood.objects.link(bpy.data.objects.new("Baum", mesh))
+    for number in range(3):
+        empty = bpy.data.objects.new(f"Hier {number}", None)
+        empty.instance_type, empty.instance_collection, empty.location.x = "COLLECTION", wood, 4 * number
+        bpy.context.scene.collection.objects.link(empty)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "wald.blend"), copy=True)
+    assert run("lod", tmp_path / "wald.blend", tmp_path / "wald.glb", "--ratios", "0.5", "--json", tmp_path / "f") == 0
+    assert len(figures(tmp_path / "f")) == 1
+    file = gltf_of(tmp_path / "wald.glb")
+    levels = [node for node in file["nodes"] if "mesh" in node]
+    assert len(levels) == 3
+    assert len(file["meshes"]) == 1

@@ -33,13 +33,13 @@ def is_hull(obj: bpy.types.Object) -> bool:
 
 def levels_of(source: bpy.types.Object) -> list[bpy.types.Object]:
     """List the levels made from an object, the finest first."""
-    found = [obj for obj in bpy.data.objects if is_level(obj) and find_source(obj) == source]
+    found = [obj for obj in bpy.data.objects if is_level(obj) and _is_made_from(obj, source)]
     return sorted(found, key=lambda obj: (obj[LEVEL], obj.name))
 
 
 def hulls_of(source: bpy.types.Object) -> list[bpy.types.Object]:
     """List the collision hulls made from an object."""
-    found = [obj for obj in bpy.data.objects if is_hull(obj) and find_source(obj) == source]
+    found = [obj for obj in bpy.data.objects if is_hull(obj) and _is_made_from(obj, source)]
     return sorted(found, key=lambda obj: (obj[HULL], obj.name))
 
 
@@ -55,6 +55,13 @@ def find_source(level: bpy.types.Object) -> bpy.types.Object | None:
     users = [obj for obj in bpy.data.objects
              if obj.data == mesh and obj.name not in taken and _can_be_source(obj, level)]
     return users[0] if len(users) == 1 else None
+
+
+def _is_made_from(made: bpy.types.Object, source: bpy.types.Object) -> bool:
+    """Tell whether the source is this one; most are told apart by their names, without a search."""
+    if made[SOURCE] != source.name and made.get(MESH) != source.data.name:
+        return False
+    return find_source(made) == source
 
 
 def _can_be_source(obj: bpy.types.Object | None, level: bpy.types.Object) -> bool:

@@ -319,6 +319,18 @@ def _operator(name: str) -> Callable[..., set[str]]:
 
 def _read_blend(path: Path) -> None:
     bpy.ops.wm.open_mainfile(filepath=str(path), load_ui=False, use_scripts=False)
+    _make_instances_real()
+
+
+def _make_instances_real() -> None:
+    """Put objects that share their meshes in the place of the empties that instance collections of them."""
+    layer = bpy.context.view_layer
+    layer.update()
+    empties = [obj for obj in layer.objects
+               if obj.type == "EMPTY" and obj.instance_collection is not None and obj.visible_get()]
+    if empties:
+        select_only(empties, layer)
+        bpy.ops.object.duplicates_make_real()
 
 
 def _write_blend(path: Path) -> None:
