@@ -375,15 +375,18 @@ def _order_block(patches: Patches) -> bytes:
     return block.finish()
 
 
-def decode_mesh(mesh: EncodedMesh, size: int) -> Patches:
-    """Return the patches of a mesh, from as many of its blocks as are there; `size` is that of the file."""
+def decode_mesh(mesh: EncodedMesh) -> Patches:
+    """Return the patches of a mesh, from as many of its blocks as are there."""
     header, given = mesh.header, len(mesh.blocks)
     if mesh.places[-1] != header["places"] or mesh.faces[-1] != header["faces"]:
         raise StreamError("the stream's table and header differ: fetch the file again")
-    limit = 4096 * (size + 4096)
-    if max(header["wedges"], header["extra"], header["edges"], int(mesh.faces[-1]) // 2) > limit:
-        raise StreamError("the stream's counts are larger than it can hold: fetch the file again")
+    # no element takes less than this part of a byte: larger counts are damage
+    limit = 4096 * (sum(map(len, mesh.blocks)) + 64)
     places, faces = mesh.places[:given], mesh.faces[:given]
+    if max(header["extra"], header["edges"], int(places[-1]), int(faces[-1]) // 2) > limit:
+        raise StreamError("the stream's counts are larger than it can hold: fetch the file again")
+    # what is there of a stream that is cut short has no more of these either
+    header = {**header, "wedges": min(header["wedges"], limit), "vertices": min(header["vertices"], limit)}
     patches = _empty_patches(header, places, faces, mesh.errors[:given])
     codec = _Codec(header, places, faces, patches, np.zeros(0, np.int64), _grid(header["grid"]), True)
     descriptors = _descriptors(header)
@@ -401,14 +404,14 @@ def decode_mesh(mesh: EncodedMesh, size: int) -> Patches:
     if given == len(mesh.places):
         if "order" in mesh.optional:
             _read_order(patches, mesh.optional["order"])
-        if digest(patches) != header["hash"]:
+        if patches.vertices != header["vertices"] or digest(patches) != header["hash"]:
             raise StreamError("the restored mesh is not the one that was written: fetch the file again")
     return patches
 
 
 def _empty_patches(header: dict[str, Any], places: Ints, faces: Ints, errors: np.ndarray) -> Patches:
     count, width = int(places[-1]), int(faces[-1])
-    wedges = header["wedges"] if "wedges" in header["needs"] else header["places"]
+    wedges = header["wedges"] if "wedges" in header["needs"] else count
     none, no_faces = np.zeros(0, np.int64), np.zeros((3, 0), np.int64)
     return Patches(np.zeros((0, 3), np.float32), none, no_faces, [], places, faces, no_faces,
                    np.zeros(count + 1, np.int64), np.full(wedges, -1), np.zeros(wedges, np.int64), no_faces, no_faces,

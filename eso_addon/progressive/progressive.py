@@ -4,11 +4,11 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Generator, Mapping
+from collections.abc import Callable, Generator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,6 +21,8 @@ from .mesh_codec import EncodedMesh, encode_mesh
 from .patches import Patches, make_patches
 from .source import Attributes, make_source
 from .stream import decode, encode
+
+Made = TypeVar("Made")
 
 
 @dataclass(frozen=True)
@@ -343,13 +345,21 @@ def load_progressive(path: str | os.PathLike[str], *, partial: bool = False,
     StreamError
         It is no such file, or damaged, or of another version.
     """
-    return from_bytes(read_bytes(path, max_bytes), partial=partial or max_bytes is not None)
+    return read_part(path, from_bytes, partial=partial, max_bytes=max_bytes)
 
 
-def read_bytes(path: str | os.PathLike[str], limit: int | None = None) -> bytes:
-    """Read a file, or no more than so many bytes of it."""
+def read_part(path: str | os.PathLike[str], read: Callable[..., Made], *, partial: bool,
+              max_bytes: int | None) -> Made:
+    """Read a file, or no more than so many bytes of it, with a function that takes bytes and `partial`."""
     with Path(path).open("rb") as file:
-        return file.read() if limit is None else file.read(max(limit, 0))
+        data = file.read() if max_bytes is None else file.read(max(max_bytes, 0))
+        more = bool(file.read(1))
+    try:
+        return read(data, partial=partial or max_bytes is not None)
+    except StreamError as error:
+        if more:
+            raise StreamError(f"{max_bytes} bytes do not hold the coarsest level ({error}): take more") from None
+        raise
 
 
 def from_bytes(data: bytes, *, partial: bool = False) -> Progressive:

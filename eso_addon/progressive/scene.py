@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..core.mesh import MeshError
-from .progressive import Level, Progressive, read_bytes, write_bytes
+from .progressive import Level, Progressive, read_part, write_bytes
 from .stream import decode, encode, file_order
 
 
@@ -89,7 +89,7 @@ class Scene:
 
 def load_scene(path: str | os.PathLike[str], *, partial: bool = False, max_bytes: int | None = None) -> Scene:
     """Read an .esopm file with any number of meshes; see `load_progressive`."""
-    return scene_from_bytes(read_bytes(path, max_bytes), partial=partial or max_bytes is not None)
+    return read_part(path, scene_from_bytes, partial=partial, max_bytes=max_bytes)
 
 
 def scene_from_bytes(data: bytes, *, partial: bool = False) -> Scene:

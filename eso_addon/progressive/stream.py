@@ -56,5 +56,5 @@ def decode(data: bytes, *, partial: bool = False) -> tuple[list[tuple[EncodedMes
         optional = {name: block for (name, mesh), block in parts.optional.items() if mesh == index}
         mesh = EncodedMesh(header, blocks, table["places"][own].astype(np.int64), table["faces"][own].astype(np.int64),
                            table["error"][own].astype(np.float64), optional)
-        meshes.append((mesh, decode_mesh(mesh, len(data))))
+        meshes.append((mesh, decode_mesh(mesh)))
     return meshes, parts.header.get("meta", {}), parts.damage

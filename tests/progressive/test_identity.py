@@ -8,6 +8,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 
 from eso_addon.core.mesh import MeshError
+from eso_addon.progressive.errors import StreamError
 from eso_addon.progressive.progressive import from_bytes, load_progressive, progressive
 
 from .meshes import Arrays, fingerprint, grid, meshes, same
@@ -87,6 +88,8 @@ def test_saved_and_loaded_in_part(tmp_path: Path) -> None:
     assert half.damage
     assert whole.base_faces < half.face_count < len(faces)
     assert np.array_equal(half.restore().faces, whole.at(faces=half.face_count).faces)
+    with pytest.raises(StreamError, match="100 bytes do not hold"):
+        load_progressive(tmp_path / "a.esopm", max_bytes=100)
 
 
 def test_bad_input_is_told() -> None:
