@@ -29,6 +29,10 @@ _DOMAINS = {"POINT": "vertex", "CORNER": "corner", "FACE": "face", "EDGE": "side
 _BACK = {"vertex": "POINT", "corner": "CORNER", "face": "FACE", "side": "EDGE"}
 # directions that differ by less are the same, within what Blender's 16 bits can tell
 _SAME = 1e-3
+# of what Blender gives a meaning, type and domain are fixed
+_BUILT_IN = {"material_index": ("INT", "FACE"), "sharp_face": ("BOOLEAN", "FACE"), "sharp_edge": ("BOOLEAN", "EDGE"),
+             "uv_seam": ("BOOLEAN", "EDGE"), "crease_edge": ("FLOAT", "EDGE"), "crease_vert": ("FLOAT", "POINT"),
+             "custom_normal": ("", "")}
 _KEY_SETTINGS = ("value", "slider_min", "slider_max", "mute", "vertex_group")
 
 
@@ -251,6 +255,11 @@ def _data_type(told: str, rows: NDArray) -> str | None:
 
 
 def _write(mesh: bpy.types.Mesh, name: str, data_type: str, domain: str, values: NDArray) -> None:
+    """Write an attribute; one of a name that is there already, as the mesh's own are, stays out."""
+    if name in mesh.attributes or _BUILT_IN.get(name, (data_type, domain)) != (data_type, domain):
+        return
+    if name == "material_index":
+        values = values.clip(0, np.iinfo(np.int16).max)
     if data_type == "BYTE_COLOR":
         attribute = mesh.attributes.new(name, data_type, domain)
         attribute.data.foreach_set("color_srgb", values.astype(np.float32).ravel() / np.float32(255))
