@@ -7,7 +7,7 @@ READY := $(VENV)/.ready
 READY_BENCH := $(VENV)/.ready-bench
 PIP_INSTALL := $(PY) -m pip install --disable-pip-version-check --quiet
 
-.PHONY: help demo test lint bench papers package clean
+.PHONY: help demo test lint bench papers package gui pictures clean
 
 help:
 	@echo "make demo     the LOD levels of the paper's cow, a table and a picture, in out/demo/"
@@ -16,6 +16,9 @@ help:
 	@echo "make bench    ours against the other simplifiers"
 	@echo "make papers   the papers' tables and figures again, in out/papers/ (MODELS=DIR: of more meshes)"
 	@echo "make package  the add-on's zip for Blender, in dist/"
+	@echo "              WHEELS=1: one zip a platform that carries pymeshlab, for Measure's second opinion"
+	@echo "make gui      the add-on in a real window, by simulated mouse and keys (BLENDER=PATH: in that Blender)"
+	@echo "make pictures the pictures of README and docs, but for those of the window, which make gui takes"
 	@echo "make clean    remove everything that these make"
 
 demo: $(READY)
@@ -30,12 +33,20 @@ lint: $(READY)
 
 bench: $(READY_BENCH)
 	$(PY) -m benchmarks
+	$(PY) -m benchmarks --ablation --ratios 0.05 --repeat 1 --minutes 15
 
 papers: $(READY)
 	$(PY) -m evidence $(if $(MODELS),--models "$(MODELS)")
 
 package: $(READY)
-	$(PY) scripts/build_package.py dist
+	$(PY) scripts/build_package.py dist $(if $(WHEELS),--wheels)
+
+gui: package
+	BLENDER="$(BLENDER)" scripts/gui_blender.sh run out/gui "$$(ls -t dist/eso_lod-*.zip | head -1)" tests_gui scenes.py
+	mkdir -p docs/images/window && cp out/gui/pictures/*.png out/gui/figures.json docs/images/window/
+
+pictures: $(READY)
+	$(PY) scripts/make_pictures.py docs/images
 
 $(READY): pyproject.toml scripts/find_python.sh scripts/check_blender.py
 	@python=$$(sh scripts/find_python.sh) && { [ -x $(PY) ] || "$$python" -m venv $(VENV); }

@@ -17,7 +17,9 @@ _CLAY, _LINES, _PAPER, _INK = (0.80, 0.52, 0.32), (0.05, 0.03, 0.02), (0.93, 0.9
 _CELL = (1.28, 1.02)  # width and height of a cell in lengths of the mesh
 
 
-def contact_sheet(path: Path, meshes: Sequence[tuple[str, bpy.types.Mesh]], width: int = 1500) -> None:
+def contact_sheet(
+    path: Path, meshes: Sequence[tuple[str, bpy.types.Mesh]], width: int = 1500, *, tall: bool = False
+) -> None:
     """Render meshes in a grid, each with its label below.
 
     Parameters
@@ -28,17 +30,20 @@ def contact_sheet(path: Path, meshes: Sequence[tuple[str, bpy.types.Mesh]], widt
         Labels and meshes, Y up. They are shown in one scale, the first one's.
     width
         Pixels.
+    tall
+        The meshes are as high as they are long.
     """
+    cell = (_CELL[0], _CELL[1] + 0.32) if tall else _CELL
     scene = bpy.data.scenes.new("Contact sheet")
     rows = ceil(len(meshes) / _COLUMNS)
     clay, ink = _clay(), _plain("Ink", _INK)
     size, centre = _frame(meshes[0][1])
     for index, (label, mesh) in enumerate(meshes):
         row, column = divmod(index, _COLUMNS)
-        place = Vector(((column + 0.5) * _CELL[0], 0, -(row + 0.5) * _CELL[1]))
+        place = Vector(((column + 0.5) * cell[0], 0, -(row + 0.5) * cell[1]))
         _add_mesh(scene, mesh, clay, place, size, centre)
-        _add_label(scene, label, ink, place - Vector((0, 0, 0.43)))
-    extent = (_COLUMNS * _CELL[0], rows * _CELL[1])
+        _add_label(scene, label, ink, place - Vector((0, 0, 0.43 + (0.16 if tall else 0))))
+    extent = (_COLUMNS * cell[0], rows * cell[1])
     _add_camera(scene, extent)
     _add_lights(scene)
     _set_up_render(scene, width, round(width * extent[1] / extent[0]))

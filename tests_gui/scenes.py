@@ -459,7 +459,7 @@ SCENES = [
 
 def scenes() -> Iterator[tuple[str, Steps]]:
     """Give those that were asked for, or all; then keep the figures."""
-    wanted = sys.argv[sys.argv.index("--") + 1 :]
+    wanted = [word for word in sys.argv[sys.argv.index("--") + 1 :] if word]
     for function in SCENES:
         name = function.__name__.removeprefix("scene_")
         if not wanted or name in wanted or name == "panel":

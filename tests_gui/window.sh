@@ -8,6 +8,7 @@ zip=$1 script=$2 size=$3 seconds=$4; shift 4
 export HOME="$GUI_OUT/user/häuschen mit Platz 家"
 export BLENDER_USER_RESOURCES="$HOME/blender ファイル"
 mkdir -p "$BLENDER_USER_RESOURCES"
+rm -f "$GUI_OUT"/*.png
 "$GUI_BLENDER" --command extension install-file -r user_default --enable "$zip"
 if [ -z "${DISPLAY:-}" ]; then
     export LIBGL_ALWAYS_SOFTWARE=1 GALLIUM_DRIVER=llvmpipe DISPLAY=:99
@@ -17,3 +18,6 @@ if [ -z "${DISPLAY:-}" ]; then
 fi
 timeout "$seconds" "$GUI_BLENDER" --enable-event-simulate --window-geometry 0 0 "${size%x*}" "${size#*x}" --python-exit-code 3 \
     --python-expr 'import bpy; bpy.context.preferences.view.show_splash = False' --python "$script" -- "$@"
+# Few colours are enough for the pages that show them.
+mkdir -p "$GUI_OUT/pictures"
+mogrify -path "$GUI_OUT/pictures" -dither None -colors 128 -define png:compression-level=9 "$GUI_OUT"/[a-z]*.png
