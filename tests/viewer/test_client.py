@@ -65,7 +65,7 @@ def test_the_picture_is_of_the_mesh(page: Page, site: Start) -> None:
     page.goto(f"{site().url}?theme=light&colours=plain")
     until(page, "s.identical && s.shown === s.faces")
     covered, brightness, deviation = page.evaluate(PICTURE)
-    assert 0.1 < covered < 0.9
+    assert 0.04 < covered < 0.9
     assert 60 < brightness < 240
     assert deviation > 5  # it is lit
 
@@ -112,7 +112,7 @@ def test_pause_and_go_on(page: Page, site: Start) -> None:
 
 def test_an_error_on_screen_is_enough(page: Page, site: Start) -> None:
     page.goto(f"{site().url}?error=16")
-    figures = until(page, "s.waiting")
+    figures = until(page, "s.waiting && s.pixels > 0")
     assert figures["received"] < figures["bytes"]
     assert 0 < figures["pixels"] <= 16
     assert words(page, ".state") == "as fine as the view needs"
@@ -132,7 +132,7 @@ def test_a_budget_is_kept(page: Page, site: Start) -> None:
         page.wait_for_timeout(40)
     for time, received in seen:
         assert received <= 1.1 * 20000 * time / 1000 + 1024, (begun, time)
-    assert len(seen) > 10
+    assert len({received for _, received in seen}) > 3  # bit by bit
 
 
 def test_frame_time_lowers_the_level(page: Page, site: Start) -> None:

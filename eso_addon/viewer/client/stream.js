@@ -7,6 +7,7 @@ import { Mesh } from './mesh.js';
 
 const FIRST = 8192; // bytes asked for at first: the first picture comes from them
 const PATIENCE = 400; // milliseconds that the first picture waits for more than the base
+const QUIET = 120; // milliseconds at least between pictures while more comes at once
 const STEP = 250; // milliseconds between steps where a slow line makes a batch's splits last until the next
 const now = () => performance.now();
 const { port1, port2 } = new MessageChannel();
@@ -32,8 +33,8 @@ export class Stream {
   /** Take new wishes of the page. */
   want(wish) {
     Object.assign(this.wish, wish);
-    if (wish.paused !== undefined || wish.views || wish.error !== undefined || wish.faces !== undefined) this.abort?.abort();
-    if (wish.faces !== undefined || wish.cap !== undefined) this.reveal = Infinity;
+    if (wish.paused || wish.budget !== undefined) this.abort?.abort(); // of other wishes the next part asks
+    if (wish.faces !== undefined || wish.cap !== undefined) this.hurry = true;
     this.wake();
     this.present();
   }
@@ -57,7 +58,7 @@ export class Stream {
       const before = this.received;
       try {
         if (!this.head) await this.open();
-        else if (this.wish.paused || !(await this.next())) await this.change();
+        else if (!(await this.next())) await this.change();
         attempt = 0;
       } catch (error) {
         if (this.received > before) attempt = 0;
@@ -104,7 +105,7 @@ export class Stream {
         at += part.length;
         if (!more) break;
         if (abort.signal.aborted && this.line.ranges) break;
-        while (this.wish.paused && this.head) await this.change(); // without ranges the line is held, not left
+        while (this.wish.paused && this.based) await this.change(); // without ranges the line is held, not left
         if (budget && !this.line.ranges) await this.pay(part.length);
       }
     } catch (error) {
@@ -144,7 +145,12 @@ export class Stream {
   }
 
   async open() {
-    await this.fetch(this.first.length, Math.max(FIRST, this.need ?? 0), async (part) => {
+    await this.fetch(this.first.length, Math.max(FIRST, this.need ?? 0), async (part, at) => {
+      if (this.head) {
+        this.put(part, at);
+        await this.decode();
+        return true;
+      }
       const grown = new Uint8Array(this.first.length + part.length);
       grown.set(this.first);
       grown.set(part, this.first.length);
@@ -152,14 +158,16 @@ export class Stream {
       if (grown.length < FIXED) return true;
       const sizes = readFixed(grown);
       this.need = FIXED + sizes.header + sizes.table;
-      return grown.length < this.need || this.line.ranges;
+      if (grown.length >= this.need && !this.line.ranges) await this.begin();
+      return true;
     });
-    if (this.first.length < (this.need ?? FIXED)) {
-      if (this.line.size && this.first.length >= this.line.size) throw new LineError('The file is cut short.', false);
-      return;
-    }
-    const head = await readHead(this.first, readFixed(this.first));
-    this.start(head);
+    if (this.head) return;
+    if (this.first.length >= (this.need ?? FIXED)) await this.begin();
+    else if (this.line.size && this.first.length >= this.line.size) throw new LineError('The file is cut short.', false);
+  }
+
+  async begin() {
+    this.start(await readHead(this.first, readFixed(this.first)));
     this.put(this.first, 0);
     this.first = null;
     await this.decode();
@@ -213,7 +221,8 @@ export class Stream {
   wanted(row) {
     if (row.done || row.tooMuch) return false;
     if (!row.before) return true;
-    const { error, faces, views } = this.wish;
+    const { error, faces, views, paused } = this.wish;
+    if (paused) return false;
     const view = views[row.mesh] ?? { visible: true, scale: 0 };
     const before = row.before;
     if (!view.visible || before.total >= faces) return false;
@@ -234,7 +243,8 @@ export class Stream {
     await this.fetch(begin, this.line.ranges ? end : Infinity, async (part, at) => {
       this.put(part, at);
       await this.decode();
-      return !this.line.ranges || this.rows[first].done || this.wanted(this.rows[first]);
+      const row = this.rows.find((one) => !one.done && one.begin + one.length > at + part.length);
+      return !this.line.ranges || !row || this.wanted(row);
     });
     if (this.rows[first].have < this.rows[first].length && this.line.size && this.line.size < end) {
       const got = this.rows[first].begin + this.rows[first].have;
@@ -295,10 +305,14 @@ export class Stream {
 
   // -- pictures ----------------------------------------------------------------------------------------------------
 
+  /** The triangles of all meshes as far as they are decoded. */
+  there() {
+    return this.meshes.reduce((sum, mesh) => sum + (mesh.places ? mesh.head.extra + mesh.faceCount : 0), 0);
+  }
+
   /** The triangles that may be shown now: wanted, there, and on a slow line spread until more comes. */
   target() {
-    let there = 0;
-    for (const row of this.rows) if (row.done) there = Math.max(there, row.total);
+    const there = this.there();
     const open = this.rows.find((row) => !row.done);
     const { faces, cap, paused } = this.wish;
     const limit = Math.min(faces, cap);
@@ -321,6 +335,16 @@ export class Stream {
       this.pending = true;
       return;
     }
+    const open = this.rows.find((row) => !row.done && this.wanted(row));
+    const left = (this.posted ?? -QUIET) + QUIET - now();
+    if (open && left > 0 && !this.hurry) {
+      this.quiet ??= setTimeout(() => {
+        this.quiet = undefined;
+        this.present();
+      }, left);
+      return;
+    }
+    this.hurry = false;
     const target = this.target();
     this.due = false;
     const places = this.placesFor(target);
@@ -332,6 +356,7 @@ export class Stream {
     this.levels = places;
     this.shown = this.meshes.reduce((sum, mesh, at) => sum + mesh.head.extra + (mesh.facesAfter[places[at] - 1] ?? 0), 0);
     this.drawing = true;
+    this.posted = now();
     const first = !this.pictured;
     this.pictured = true;
     this.tell({ type: 'level', changes, shown: this.shown, first, used: this.used(), time: now() - this.begun });
@@ -379,7 +404,7 @@ export class Stream {
     if (!force && time - (this.told ?? 0) < 60) return;
     this.told = time;
     const rows = this.rows ?? [];
-    const there = rows.reduce((most, row) => (row.done ? Math.max(most, row.total) : most), 0);
+    const there = this.head ? this.there() : 0;
     const errors = (this.states ?? []).map((state) => this.errorOf(state));
     this.tell({
       type: 'progress', received: this.received, there, shown: this.shown, errors, ranges: this.line.ranges,
