@@ -8,6 +8,7 @@ import numpy as np
 from .adjacency import vertex_components
 from .levels import SimplifyResult
 from .mesh import Floats, Ints, weld
+from .options import Options
 
 
 def prune_for(result: SimplifyResult, target: int) -> tuple[float, int] | None:
@@ -63,3 +64,11 @@ def _short_number_between(low: float, high: float) -> float:
             if low < number <= high:
                 return number
     return high
+
+
+def locks_of(options: Options) -> tuple[str, ...]:
+    """Name the options that keep edges or vertices of a mesh from going."""
+    lines = [name for name in ("seam_lines", "material_lines", "sharp_lines", "boundary_lines")
+             if getattr(options, name) == "locked"]
+    held = options.locked is not None and bool(np.any(options.locked))
+    return (*lines, *(["the vertices that are locked"] if held else []))

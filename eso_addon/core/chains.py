@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from .advice import prune_for
+from .advice import locks_of, prune_for
 from .budget import share_budget
 from .levels import Mesh, SimplifyResult
 from .mesh import MeshError, check_mesh
@@ -109,7 +109,7 @@ def _chain_steps(mesh: Mesh, goals: Goals, options: Options) -> Generator[float,
     recording = yield from scaled(recording_steps(mesh, options, least), lambda part: 0.8 * part)
     results = yield from scaled(recording.levels_steps(counts, errors), lambda part: 0.8 + 0.15 * part)
     yield 0.95
-    return _chain(results, counts, mesh, goals)
+    return _chain(results, counts, mesh, goals, options)
 
 
 def _targets(mesh: Mesh, goals: Goals) -> tuple[list[int], list[float]]:
@@ -133,11 +133,11 @@ def _budget_steps(meshes: list[Mesh], goals: Goals, options: Sequence[Options],
         recordings.append((yield from run))
     shares = share_budget(recordings, [int(total) for total in goals.values], copies)
     chains = []
-    for done, (mesh, recording) in enumerate(zip(meshes, recordings, strict=True)):
+    for done, (mesh, recording, own) in enumerate(zip(meshes, recordings, options, strict=True)):
         counts = [int(count) for count in shares[:, done]]
         results = yield from scaled(recording.levels_steps(counts, []),
                                     lambda part, done=done: 0.8 + 0.2 * (done + part) / len(meshes))
-        chains.append(_chain(results, counts, mesh, goals))
+        chains.append(_chain(results, counts, mesh, goals, own))
     times = [1] * len(meshes) if copies is None else list(copies)
     return _with_shortfalls(chains, (shares @ np.array(times)).tolist(), goals)
 
@@ -150,16 +150,27 @@ def _with_shortfalls(chains: list[Chain], sums: Sequence[int], goals: Goals) -> 
     return [Chain(chains[0].levels, (*chains[0].messages, *short)), *chains[1:]]
 
 
-def _chain(results: list[SimplifyResult], counts: list[int], mesh: Mesh, goals: Goals) -> Chain:
+def _advice(result: SimplifyResult, target: int, options: Options) -> list[str]:
+    """Say what would get a level down to its target."""
+    found = []
+    if prune := prune_for(result, target):
+        size, parts = prune
+        found.append(f"pruning at {size:g} would reach {target} triangles, without {parts} "
+                     f"small part{'s' if parts > 1 else ''}")
+    if locks := locks_of(options):
+        found.append(f"what is locked holds triangles: release {', '.join(locks)} to go on")
+    return found
+
+
+def _chain(results: list[SimplifyResult], counts: list[int], mesh: Mesh, goals: Goals, options: Options) -> Chain:
     """Judge the levels: leave out copies of the one before, say what would help, find the distances."""
     levels: list[Level] = []
     messages: list[str] = []
     extent = extent_of(*mesh)
     for index, result in enumerate(results):
         messages += [text for text in result.messages if text not in messages]
-        if not result.reached and counts and (advice := prune_for(result, counts[index])):
-            messages.append(f"pruning at {advice[0]:g} would reach {counts[index]} triangles, without {advice[1]} "
-                            f"small part{'s' if advice[1] > 1 else ''}")
+        if not result.reached and counts:
+            messages += [text for text in _advice(result, counts[index], options) if text not in messages]
         is_copy = levels and len(result.faces) >= len(levels[-1].result.faces)
         if is_copy and goals.kind != "budget":  # whose levels need every mesh, to add up
             messages.append(f"level {index} is left out: it would be a copy of the level before, which has "

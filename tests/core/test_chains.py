@@ -32,7 +32,7 @@ def chains(meshes: Sequence[shapes.Mesh], kind: str, values: Sequence[float], *,
 
 @pytest.mark.parametrize(("kind", "name", "values"), [
     ("ratio", "ratios", [0.5, 0.2, 0.1]), ("count", "faces_targets", [300, 100, 20]),
-    ("error", "max_errors", [0.005, 0.05])])
+    ("error", "max_errors", [0.05])])
 def test_each_mesh_gets_what_it_gets_alone(kind: str, name: str, values: list[float]) -> None:
     for chain, mesh in zip(chains([BALL, TORUS], kind, values), (BALL, TORUS), strict=True):
         alone = lod_chain(*mesh, **{name: values})  # type: ignore[arg-type]
@@ -48,10 +48,10 @@ def test_a_level_begins_where_its_error_is_a_pixel() -> None:
 
 
 def test_levels_by_size_are_within_a_pixel_at_that_size() -> None:
-    screen, sizes = Screen(), [400, 100, 50]
+    screen, sizes = Screen(), [400, 50]
     (chain,) = chains([TORUS], "screen", sizes)
     extent = float(np.ptp(TORUS[0], axis=0).max())
-    assert len(chain.levels) == 3
+    assert len(chain.levels) == 2
     for level, size in zip(chain.levels, sizes, strict=True):
         assert level.distance == pytest.approx(screen.distance_for_size(extent, size))
         assert level.result.error * screen.focal / level.distance <= 1
@@ -101,3 +101,14 @@ def test_a_budget_out_of_reach_says_so() -> None:
 def test_bad_goals(kind: str, values: list[float]) -> None:
     with pytest.raises(MeshError):
         chains([BALL], kind, values)
+
+
+def test_locks_that_hold_triangles_are_named() -> None:
+    mesh = shapes.sheet(8, 8)
+    (chain,) = chains([mesh], "count", [2], boundary_lines="locked")
+    assert not chain.levels[0].result.reached
+    assert "release boundary_lines" in " ".join(chain.messages)
+    (chain,) = chains([mesh], "count", [2], locked=np.ones(len(mesh[0]), bool))
+    assert "release the vertices that are locked" in " ".join(chain.messages)
+    (chain,) = chains([mesh], "count", [2])
+    assert "release" not in " ".join(chain.messages)
