@@ -16,6 +16,7 @@ from eso_addon.bridge.read_mesh import MeshArrays, read_mesh
 from eso_addon.bridge.scene_files import READERS
 from eso_addon.bridge.write_mesh import write_mesh
 from eso_addon.core.closest import ClosestPoints
+from eso_addon.core.deviation import measure
 from eso_addon.core.sampling import face_samples
 from eso_addon.core.simplify import simplify
 
@@ -79,8 +80,14 @@ def compare(path: Path, ratio: float, pictures: Path | None, options: dict[str, 
                      f"{result.error:.3g} against {plain.error:.3g} {' '.join(result.messages)}")
         for title, figure in FIGURES.items():
             one, other = figure(source, obj, ours), figure(source, obj, theirs)
+            if one is not None and other is None:
+                lines.append(f"    {title:28} {one:12.6g}         none")
             if one is not None and other is not None:
                 lines.append(f"    {title:28} {one:12.6g} {other:12.6g}   {one / other if other else np.nan:8.3f}")
+        posed = posed_deviation(obj, ours, theirs)
+        if posed is not None:
+            lines.append(f"    {'posed, mean distance':28} {posed[0]:12.6g} {posed[1]:12.6g}   "
+                         f"{posed[0] / posed[1]:8.3f}")
     if pictures is not None and shown:
         one, other = rendered_difference(shown, pictures, f"{path.stem}_{ratio:g}")
         lines.append(f"    {'rendered difference':28} {one:12.6g} {other:12.6g}   {one / max(other, 1e-12):8.3f}")
@@ -259,6 +266,30 @@ def key_error(source: MeshArrays, _: bpy.types.Object, mesh: bpy.types.Mesh) -> 
             apart = np.linalg.norm((points - neutral).reshape(-1, 3) - there, axis=1).mean()
             worst = max(worst, float(apart) / most)
     return worst
+
+
+def posed_deviation(obj: bpy.types.Object, *meshes: bpy.types.Mesh) -> list[float] | None:
+    """Return how far meshes are from the original on average, posed by its armature in three frames."""
+    armatures = [modifier for modifier in obj.modifiers if modifier.type == "ARMATURE" and modifier.object]
+    if not armatures or not bpy.data.actions:
+        return None
+    start, end = bpy.data.actions[0].frame_range
+    original, sums = obj.data, np.zeros(len(meshes))
+    armatures[0].show_viewport = True
+    for part in (0.2, 0.5, 0.8):
+        bpy.context.scene.frame_set(int(start + part * (end - start)))
+        surfaces = []
+        for mesh in (original, *meshes):
+            obj.data = mesh
+            bpy.context.view_layer.update()
+            evaluated = obj.evaluated_get(bpy.context.evaluated_depsgraph_get())
+            surface = Surface(evaluated.to_mesh())
+            surfaces.append((surface.points, surface.faces))
+        sums += [measure(*surfaces[0], *surface, samples=SAMPLES).symmetric.mean for surface in surfaces[1:]]
+    obj.data = original
+    armatures[0].show_viewport = False
+    bpy.context.scene.frame_set(int(start))
+    return list(sums / 3)
 
 
 FIGURES: dict[str, Callable[[MeshArrays, bpy.types.Object, bpy.types.Mesh], float | None]] = {
