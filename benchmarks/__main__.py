@@ -32,6 +32,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--peers", type=_words, help=f"of {', '.join(PEERS)} (default: all)")
     parser.add_argument("--repeat", type=int, default=3, help="runs of each case (default: 3)")
     parser.add_argument("--timeout", type=float, default=1800.0, help="seconds that one call may take (default: 1800)")
+    parser.add_argument("--minutes", type=float, default=40.0, help="begin nothing new after so many; 0: run all of it")
     parser.add_argument("--quick", action="store_true", help=f"{', '.join(QUICK)} at 5 %%, one run each")
     parser.add_argument("--ablation", action="store_true", help="compare the engine's options instead of the peers")
     parser.add_argument("--from", dest="earlier", type=Path, help="write the report again from this bench.json")
@@ -70,7 +71,8 @@ def main(words: Sequence[str] | None = None) -> int:
     names = _chosen(parser, "mesh", told.meshes, list(meshes))
     skipped = {peer.name: why for peer in wanted if (why := peer.missing())}
     peers = [peer for peer in wanted if peer.name not in skipped]
-    plan = Plan({name: meshes[name] for name in names}, ratios, peers, max(1, told.repeat), told.timeout)
+    plan = Plan({name: meshes[name] for name in names}, ratios, peers, max(1, told.repeat), told.timeout,
+                told.minutes or None)
     start = time.monotonic()
 
     def say(line: str) -> None:
@@ -79,7 +81,7 @@ def main(words: Sequence[str] | None = None) -> int:
     for name, why in skipped.items():
         say(f"left out: {name} ({why})")
     if told.ablation:
-        write_ablation(told.out, run_ablation(plan, say))
+        run_ablation(plan, say, lambda found: write_ablation(told.out, found))
         say(f"wrote {told.out / 'ablation.md'}")
         return 0
     rows = run(plan, say, lambda found: write(told.out, found, skipped))

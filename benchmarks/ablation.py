@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 import statistics
 import tempfile
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,7 @@ BASE = "default"
 VARIANTS: dict[str, dict[str, Any]] = {
     BASE: {},
     "refit off": {"refit": False},
+    "refit without flips": {"flips": False},
     "`qem`, refit off": {"method": "qem", "refit": False},
     "`qem`, refit on": {"method": "qem"},
     "`so` (one ring)": {"method": "so"},
@@ -31,10 +33,18 @@ VARIANTS: dict[str, dict[str, Any]] = {
 KINDS = ("maximum", "mean", "normal", "seconds")
 
 
-def run_ablation(plan: Plan, say: Callable[[str], None]) -> list[dict[str, Any]]:
-    """Run every variant over the meshes and ratios of the plan (its peers are not used); return plain rows."""
+def run_ablation(plan: Plan, say: Callable[[str], None],
+                 keep: Callable[[list[dict[str, Any]]], None] = lambda _: None) -> list[dict[str, Any]]:
+    """Run every variant over the meshes and ratios of the plan (its peers are not used); return plain rows.
+
+    `keep` is given all rows so far after each mesh.
+    """
     rows: list[dict[str, Any]] = []
+    end = time.monotonic() + 60 * plan.minutes if plan.minutes else float("inf")
     for name, make in plan.meshes.items():
+        if time.monotonic() > end:
+            say(f"time is up: {name} is left out")
+            continue
         mesh = make()
         with tempfile.TemporaryDirectory() as folder:
             cases = MeshRun(name, mesh, Path(folder), plan, say)
@@ -43,6 +53,7 @@ def run_ablation(plan: Plan, say: Callable[[str], None]) -> list[dict[str, Any]]
                     found = _level(cases, ratio)
                     rows += found
                     say(f"{name} at {ratio:.0%}: {len(found)} of {len(VARIANTS)} variants")
+        keep(rows)
     return rows
 
 

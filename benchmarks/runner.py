@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import statistics
 import tempfile
+import time
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass
@@ -18,7 +19,10 @@ from .peers import CHAIN, FIGURES, PEERS, Peer
 from .readers import Mesh
 from .worker import Worker
 
-HUGE = 1_500_000  # triangles above which foreign peers run once only: MeshLab needs minutes there
+LARGE = 500_000  # triangles above which foreign peers run once only
+HUGE = 1_500_000  # triangles above which only times are taken, and in a limited time from these peers and ours alone
+QUICK = ("decimate", "fast-simplification", "meshoptimizer")
+FIRST = 0.05  # the ratio that times are compared at: every mesh is run at it before any at another
 SAMPLES = 50_000  # a direction: the mean is steady to about 1 %
 TIMED_FROM = 50_000  # triangles from which times, memory and chains count
 
@@ -44,13 +48,27 @@ class Row:
 
 @dataclass(frozen=True)
 class Plan:
-    """What to run: meshes by name, ratios, peers, repeats, and the seconds a peer may take for one answer."""
+    """What to run: meshes by name, ratios, peers, repeats, and what time it may take.
+
+    A peer may take `timeout` seconds for one answer. Nothing new is begun after `minutes`, and huge meshes get fewer
+    peers and one ratio; without it all is run.
+    """
 
     meshes: dict[str, Callable[[], Mesh]]
     ratios: Sequence[float]
     peers: Sequence[Peer]
     repeat: int = 3
     timeout: float | None = None
+    minutes: float | None = None
+
+    def rounds(self) -> list[tuple[str, list[float]]]:
+        """Return the meshes to run and at which ratios, in order: the most telling first."""
+        first = [ratio for ratio in self.ratios if ratio == FIRST] or list(self.ratios[:1])
+        others = [ratio for ratio in self.ratios if ratio not in first]
+        found = [(name, [FIRST] if name in SPECIAL else first) for name in self.meshes]
+        if others:
+            found += [(name, others) for name in self.meshes if name not in SPECIAL]
+        return found
 
 
 def deviation(original: Mesh, simplified: Mesh) -> dict[str, float]:
@@ -93,7 +111,7 @@ class MeshRun:
         for turn in range(self.plan.repeat):
             for peer, target in questions:
                 key = (peer.name, target)
-                if key in failed or (turn and not peer.ours and self.triangles > HUGE):
+                if key in failed or (turn and not peer.ours and self.triangles > LARGE):
                     continue
                 answer = self.worker(peer).ask(target)
                 if "error" in answer:
@@ -118,9 +136,10 @@ class MeshRun:
         """Simplify to one level with every peer."""
         target = max(4, round(self.triangles * ratio))
         special = self.name in SPECIAL
-        peers = [peer for peer in self.plan.peers if not special or peer.ours or peer.name == "decimate"]
-        answers = self.turns([(peer, target) for peer in peers])
-        return [self.row(ratio, peer, target, found) for (peer, _), found in answers.items()]
+        huge = self.triangles > HUGE
+        few = ("decimate",) if special else QUICK if huge and self.plan.minutes else tuple(PEERS)
+        answers = self.turns([(peer, target) for peer in self.plan.peers if peer.ours or peer.name in few])
+        return [self.row(ratio, peer, target, found, measured=not huge) for (peer, _), found in answers.items()]
 
     def figures(self) -> list[Row]:
         """Time the chain of five levels, what it is compared with, and the weights alone."""
@@ -152,17 +171,31 @@ def run(plan: Plan, say: Callable[[str], None], keep: Callable[[list[dict[str, A
         One `Row` each, as plain data.
     """
     rows: list[dict[str, Any]] = []
-    for name, make in plan.meshes.items():
-        mesh = make()
+    end = time.monotonic() + 60 * plan.minutes if plan.minutes else float("inf")
+    for name, ratios in plan.rounds():
+        if time.monotonic() > end:
+            say(f"time is up: {name} at {', '.join(f'{ratio:.0%}' for ratio in ratios)} is left out")
+            continue
+        mesh = plan.meshes[name]()
+        if plan.minutes and len(mesh[1]) > HUGE and FIRST not in ratios:
+            continue
         with tempfile.TemporaryDirectory() as folder:
             cases = MeshRun(name, mesh, Path(folder), plan, say)
             with cases.stack:
-                for ratio in (0.05,) if name in SPECIAL else plan.ratios:
-                    rows += [asdict(row) for row in cases.levels(ratio)]
-                    say(f"{name} ({cases.triangles:,} triangles) at {ratio:.0%}: {_line(rows, name, ratio)}")
-                if any(peer.ours for peer in plan.peers) and cases.triangles >= TIMED_FROM and name not in SPECIAL:
-                    rows += [asdict(row) for row in cases.figures()]
+                rows += _cases_of(cases, ratios, say)
         keep(rows)
+    return rows
+
+
+def _cases_of(cases: MeshRun, ratios: Sequence[float], say: Callable[[str], None]) -> list[dict[str, Any]]:
+    """Run one mesh at some ratios, and at the first of all also what times are summed up from."""
+    name, rows = cases.name, []
+    for ratio in ratios:
+        rows += [asdict(row) for row in cases.levels(ratio)]
+        say(f"{name} ({cases.triangles:,} triangles) at {ratio:.0%}: {_line(rows, name, ratio)}")
+    own = any(peer.ours for peer in cases.plan.peers)
+    if own and TIMED_FROM <= cases.triangles <= HUGE and name not in SPECIAL and ratios == cases.plan.rounds()[0][1]:
+        rows += [asdict(row) for row in cases.figures()]
     return rows
 
 

@@ -54,7 +54,8 @@ def ratios(rows: Rows, ours: str, others: Iterable[str], figure: str, timed: boo
     found = {}
     for case, row in _cases(rows, ours).items():
         best = [rival[case][figure] for rival in rivals if case in rival]
-        if best and (not timed or (case[1] == 0.05 and row["triangles"] >= TIMED_FROM)):
+        best = [value for value in best if value == value]  # huge meshes are timed, not measured
+        if best and row[figure] == row[figure] and (not timed or (case[1] == 0.05 and row["triangles"] >= TIMED_FROM)):
             found[case] = max(row[figure], 1e-9) / max(min(best), 1e-9)
     return found
 

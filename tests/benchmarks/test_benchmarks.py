@@ -32,7 +32,7 @@ def rows() -> Rows:
         patch.setattr(runner, "SAMPLES", 2000)
         found = run(plan, said.append, lambda so_far: kept.append(len(so_far)))
     assert [line for line in said if "failed" in line] == []
-    assert kept == [len(found)]
+    assert kept == [len(found) // 2, len(found)]  # 5 % first
     return found
 
 
@@ -159,6 +159,21 @@ def test_a_peer_that_fails_is_named_and_left_out(tmp_path: Path) -> None:
     plan = Plan({"tiny": partial(shapes.scan, 300)}, (0.2,), [broken], repeat=2)
     assert run(plan, said.append, lambda _: None) == []
     assert sum("qem failed at" in line for line in said) == 1
+
+
+def test_every_mesh_is_run_at_five_percent_before_any_at_another_ratio() -> None:
+    made = dict.fromkeys(("one", "grid", "two"), partial(shapes.scan, 300))
+    plan = Plan(made, (0.2, 0.05, 0.01), [])
+    assert plan.rounds() == [("one", [0.05]), ("grid", [0.05]), ("two", [0.05]), ("one", [0.2, 0.01]),
+                             ("two", [0.2, 0.01])]
+
+
+def test_nothing_is_begun_when_the_time_is_up() -> None:
+    said: list[str] = []
+    plan = Plan({"tiny": partial(shapes.scan, 300)}, (0.2, 0.05), [PEERS["qem"]], minutes=1e-12)
+    assert run(plan, said.append, lambda _: None) == []
+    assert run_ablation(plan, said.append) == []
+    assert sum("time is up" in line for line in said) == 3
 
 
 def test_a_peer_that_takes_too_long_is_ended(tmp_path: Path) -> None:
