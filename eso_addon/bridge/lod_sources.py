@@ -143,6 +143,21 @@ def write_chain(source: LodSource, chain: Chain, names: Sequence[str],
     return written
 
 
+def write_chains(sources: Sequence[LodSource], chains: Sequence[Chain], names: Sequence[Sequence[str]],
+                 writing: Mapping[str, Any]) -> list[list[LevelMesh]]:
+    """Make the meshes of several chains, all of them or none; see `write_chain`."""
+    written: list[list[LevelMesh]] = []
+    before = set(bpy.data.meshes)
+    try:
+        for source, chain, own in zip(sources, chains, names, strict=True):
+            written.append(write_chain(source, chain, own, writing))
+    except MeshError:
+        for mesh in set(bpy.data.meshes) - before:
+            bpy.data.meshes.remove(mesh)
+        raise
+    return written
+
+
 def told_of(level: LevelMesh, obj: bpy.types.Object, settings: str, profile: str) -> LevelMesh:
     """Have a level tell which object it was made from, and how."""
     own = {level_info.SOURCE: obj.name, level_info.MESH: obj.data.name, level_info.HASH: fingerprint(obj),

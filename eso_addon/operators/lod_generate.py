@@ -13,7 +13,7 @@ from ..bridge.lod_sources import (
     name_meshes,
     read_sources,
     told_of,
-    write_chain,
+    write_chains,
 )
 from ..bridge.place_levels import Place, place_levels, plan_places
 from ..core.chains import Chain, chains_steps
@@ -78,9 +78,9 @@ class OBJECT_OT_eso_lod_generate(EngineOperator, LodOptions, bpy.types.Operator)
         """Write the levels as objects, the finest first."""
         place_of = {place.source: place for place in self._places}
         made: list[bpy.types.Object] = []
-        for source, chain in zip(self._sources, result, strict=True):
-            names = place_of[source.objects[0]].names
-            levels = write_chain(source, chain, names, self._settings.writing)
+        names_of = [place_of[source.objects[0]].names for source in self._sources]
+        written = write_chains(self._sources, result, names_of, self._settings.writing)
+        for source, chain, levels, names in zip(self._sources, result, written, names_of, strict=True):
             settings = level_info.settings_text(
                 self._settings.stored([len(level.result.faces) for level in chain.levels])
             )

@@ -9,7 +9,7 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty
 
 from ..bridge import level_info
-from ..bridge.lod_sources import LodSource, engine_inputs, read_sources, told_of, write_chain
+from ..bridge.lod_sources import LodSource, engine_inputs, read_sources, told_of, write_chains
 from ..bridge.place_levels import put_mesh
 from ..core.chains import Chain, chains_steps
 from ..core.mesh import MeshError
@@ -63,9 +63,11 @@ class OBJECT_OT_eso_lod_update(EngineOperator, bpy.types.Operator):
     def finish(self, context: bpy.types.Context, result: list[Chain]) -> None:
         """Put the new meshes in the place of the old ones."""
         lines, notes = [], []
-        for (source, settings), chain in zip(self._sources, result, strict=True):
-            new = write_chain(source, chain, [f"{source.objects[0].name} new"] * len(chain.levels),
-                              settings.writing)
+        written = [
+            write_chains([source], [chain], [["eso_lod new level"] * len(chain.levels)], settings.writing)[0]
+            for (source, settings), chain in zip(self._sources, result, strict=True)
+        ]
+        for (source, settings), chain, new in zip(self._sources, result, written, strict=True):
             stored = level_info.settings_text(settings.stored([]))
             for obj in source.objects:
                 own = [told_of(level, obj, stored, settings.profile) for level in new]

@@ -5,7 +5,9 @@ import bpy
 import numpy as np
 import pytest
 
+from eso_addon.bridge import lod_sources
 from eso_addon.bridge.read_mesh import read_mesh
+from eso_addon.core.mesh import MeshError
 from eso_addon.core.simplify import lod_chain
 from tests.bridge.blender_scenes import activate, add_sphere, arrays, linked_from_library
 
@@ -311,3 +313,34 @@ def test_a_vertex_group_protects_those_that_have_it() -> None:
     activate(one, other)
     with pytest.raises(RuntimeError, match="no vertex group 'Nose'"):
         generate(ratios="0.6", vertex_group="Nose")
+
+
+def test_a_library_override_gets_local_levels(tmp_path: Path) -> None:
+    far = bpy.data.collections.new("Far")
+    bpy.context.scene.collection.children.link(far)
+    far.objects.link(add_sphere("Ball", 2))
+    linked = linked_from_library(tmp_path, "collections", "Far")
+    linked.override_hierarchy_create(bpy.context.scene, bpy.context.view_layer, do_fully_editable=True)
+    source = next(obj for obj in bpy.data.objects if obj.override_library is not None)
+    bpy.context.view_layer.update()
+    activate(source)
+    generate(ratios="0.5")
+    (level,) = level_objects()
+    assert (level.override_library, level.library, level.data.library) == (None, None, None)
+    assert level["eso_triangles"] == 40
+    assert source.data.library is not None or source.data.override_library is not None
+
+
+def test_what_cannot_be_written_leaves_nothing_behind(monkeypatch: pytest.MonkeyPatch) -> None:
+    def write_mesh(result: object, source: object, name: str, **options: object) -> bpy.types.Mesh:
+        if name.startswith("Other"):
+            raise MeshError("the result has coordinates too large for Blender: scale the mesh down")
+        return bpy.data.meshes.new(name)
+
+    monkeypatch.setattr(lod_sources, "write_mesh", write_mesh)
+    activate(add_sphere("One", 2), add_sphere("Other", 2))
+    with pytest.raises(RuntimeError, match="too large"):
+        generate(ratios="0.5")
+    assert sorted(mesh.name for mesh in bpy.data.meshes) == ["One", "Other"]
+    assert len(bpy.data.objects) == 2
+    assert not bpy.data.collections
