@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 _SAMPLE = 512
 # levels with faces in this ratio are measured; those between lie on the line between two, which is never less than the
 # convex fall of errors
-_STEP = 0.6
+_STEP = 0.5
 # of larger levels only faces near what the samples have become are looked at
 _LARGE = 8192
 
