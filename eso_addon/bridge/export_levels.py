@@ -37,19 +37,13 @@ class LevelGroup:
 
 def groups_of(sources: Sequence[bpy.types.Object], name: Callable[[str, int], str],
               hull_name: Callable[[str, int], str]) -> list[LevelGroup]:
-    """Gather what was made from each object, with the names that a profile gives.
-
-    Raises
-    ------
-    MeshError
-        Two levels of an object have the same number.
-    """
+    """Gather what was made from each object, with the names that a profile gives."""
     groups = []
     for source in sources:
-        levels, hulls = level_info.levels_of(source), level_info.hulls_of(source)
-        numbers = [level[level_info.LEVEL] for level in levels]
-        if len(set(numbers)) < len(numbers):
-            raise MeshError(f"'{source.name}' has two levels {max(numbers, key=numbers.count)}: delete one of them")
+        # Copies that the user made of a level come after it.
+        by_number = {level[level_info.LEVEL]: level for level in reversed(level_info.levels_of(source))}
+        levels = [by_number[number] for number in sorted(by_number)]
+        hulls = level_info.hulls_of(source)
         groups.append(LevelGroup(
             source.name, {level: name(source.name, number) for number, level in enumerate(levels)},
             {hull: hull_name(source.name, number) for number, hull in enumerate(hulls, start=1)}))

@@ -31,9 +31,7 @@ class Place:
     names
         Of the levels, the finest first; as many as the chain may have.
     earlier
-        Objects that are made again, by level.
-    surplus
-        Earlier levels that go.
+        Objects that are made again, by level; copies that the user made of them are left alone.
     collection
         The name of the collection.
     """
@@ -41,7 +39,6 @@ class Place:
     source: bpy.types.Object
     names: list[str]
     earlier: dict[int, bpy.types.Object]
-    surplus: list[bpy.types.Object]
     collection: str
 
 
@@ -76,8 +73,7 @@ def plan_places(sources: Sequence[bpy.types.Object], count: int, name: Callable[
         ours += earlier
         here = [obj for obj in earlier if wanted in {c.name for c in obj.users_collection}] or earlier
         by_level = {obj[level_info.LEVEL]: obj for obj in reversed(here)} if replace else {}
-        surplus = [obj for obj in here if obj not in by_level.values()] if replace else []
-        place = Place(source, fitting_names(source.name, count, name), by_level, surplus, wanted)
+        place = Place(source, fitting_names(source.name, count, name), by_level, wanted)
         places.append(place)
         names += place.names
     check_free(names, ours)
@@ -106,7 +102,7 @@ def place_levels(place: Place, levels: Sequence[LevelMesh], scene: bpy.types.Sce
     # What a scene shows through instances alone has its levels where these find them, and nowhere else.
     shown = place.source in scene.objects.values()
     collection = objects.level_collection(place.collection, scene, shown=shown)
-    for obj in place.surplus + [obj for number, obj in place.earlier.items() if number >= len(levels)]:
+    for obj in [obj for number, obj in place.earlier.items() if number >= len(levels)]:
         remove_with_mesh(obj)
     placed = []
     for number, level in enumerate(levels):

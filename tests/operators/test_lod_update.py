@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Levels made again in place, and the marks of those whose source was edited."""
 
+from pathlib import Path
+
 import bpy
 import pytest
 
@@ -165,3 +167,21 @@ def test_without_levels() -> None:
     add_mesh("Plain", [(0, 0, 0), (1, 0, 0), (0, 1, 0)], [(0, 1, 2)])
     with pytest.raises(RuntimeError, match="No levels"):
         update()
+
+
+def test_copies_that_the_user_made_stay(tmp_path: Path) -> None:
+    obj = add_sphere()
+    generate(ratios="0.5, 0.25")
+    fine = levels()[0]
+    copy, twin = fine.copy(), fine.copy()
+    twin.data = fine.data.copy()
+    for other in (copy, twin):
+        fine.users_collection[0].objects.link(other)
+    activate(obj)
+    generate(ratios="0.4, 0.2")
+    assert len(levels()) == 4
+    assert copy.data == fine.data != twin.data
+    bpy.ops.object.eso_lod_export(filepath=str(tmp_path / "levels.glb"))
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    bpy.ops.import_scene.gltf(filepath=str(tmp_path / "levels.glb"))
+    assert sorted(o.name for o in bpy.data.objects) == ["Ball_LOD0", "Ball_LOD1"]
