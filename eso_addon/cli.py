@@ -31,7 +31,10 @@ if TYPE_CHECKING:
 
 FORMATS = (".blend", ".fbx", ".glb", ".gltf", ".obj", ".off", ".ply", ".stl")
 METHODS = ("eso", "so", "cf", "qem", "feature")
-_ENGINE_WORDS = ("method", "rings", "preset", "placement", "prune", "weld", "threads")
+_LINES = {"seam": "seams of UV and other values", "material": "borders of materials", "sharp": "sharp edges",
+          "boundary": "open boundaries"}
+_ENGINE_WORDS = ("method", "rings", "preset", "placement", "prune", "weld", "threads", "symmetry",
+                 *(f"{line}_lines" for line in _LINES))
 
 
 class Model(Protocol):
@@ -187,6 +190,9 @@ def _add_engine_words(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--prune", type=_length, metavar="SIZE", help="drop loose parts smaller than this")
     parser.add_argument("--threads", type=_count, metavar="N", help="of the engine (default: all cores, at most 4)")
     parser.add_argument("--no-weld", dest="weld", action="store_false", help="keep vertices at equal positions apart")
+    parser.add_argument("--symmetry", choices=("x", "y", "z"), help="symmetric results of symmetric meshes")
+    for line, title in _LINES.items():
+        parser.add_argument(f"--{line}-lines", choices=("kept", "locked", "ignored"), help=f"{title} (default: kept)")
 
 
 def _path(word: str) -> Path:
