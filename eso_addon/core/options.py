@@ -146,7 +146,7 @@ class Options:
                       spread=self.spread, curvature_factor=self.method == "cf")
         # a weight renewed before each batch bears large ones: measured in docs/decisions/features.md
         return rules if self.method != "feature" else replace(
-            rules, flip=0.2, guard=True, share=0.75, careful=1.0, few=2000, passes=4, spread=np.inf)
+            rules, flip=0.2, guard=True, share=0.75, careful=1.0, few=2000, passes=2, spread=np.inf)
 
 
 # the equations as printed: planes of weight one, weights once and to the first power, nothing held, edges only
