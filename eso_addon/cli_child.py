@@ -27,6 +27,8 @@ def answer(request: dict[str, Any]) -> dict[str, Any]:
     """
     from . import cli
 
+    if "sheet" in request:
+        return _draw(request)
     said = io.StringIO()
     with tempfile.TemporaryDirectory(prefix="eso_lod_") as folder:
         figures = Path(folder) / "figures.json"
@@ -39,6 +41,16 @@ def answer(request: dict[str, Any]) -> dict[str, Any]:
         if code:
             return {"error": said.getvalue().strip().removeprefix("eso_lod: ")}
         return json.loads(figures.read_text(encoding="utf-8"))
+
+
+def _draw(request: dict[str, Any]) -> dict[str, Any]:
+    try:
+        from .bridge.contact_sheet import contact_sheet
+
+        contact_sheet(Path(request["sheet"]), [Path(name) for name in request["meshes"]], request["labels"])
+    except Exception as error:  # without Blender there is a table and no picture
+        return {"error": " ".join(f"{type(error).__name__}: {error}".split())}
+    return {}
 
 
 if __name__ == "__main__":

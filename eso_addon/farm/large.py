@@ -19,8 +19,9 @@ from .machine import own_memory
 
 Ints = NDArray[np.int64]
 
-# bytes that the engine takes for a triangle, measured, and what a process takes before it has any
-WHOLE, CELL, IDLE = 560, 640, 90 * 2**20
+# bytes for a triangle, measured: in the engine, in a cell, and for one of the result that is fitted to its original;
+# and what a process takes before it has any
+WHOLE, CELL, FITTED, IDLE = 400, 600, 1500, 90 * 2**20
 _LEAST_CELL = 20_000
 _SPARE = 4  # how much finer than the goal the cells' levels are, if that fits
 _NEAR = 1.08  # the same for those that are followed by cells cut elsewhere: their borders stay that fine
@@ -58,15 +59,13 @@ class Plan:
         """Bytes for each worker."""
         return (self.memory - own_memory()) // self.workers
 
-    @property
-    def in_cell(self) -> int:
-        """Triangles that a worker can take."""
-        return (self.of_worker - IDLE) // CELL
+    def in_cell(self, part: float = 0.0) -> int:
+        """Triangles that a worker can take, if such a part of them is left and fitted."""
+        return int((self.of_worker - IDLE) / (CELL + FITTED * part))
 
-    @property
-    def at_once(self) -> int:
-        """Triangles that this process can take."""
-        return (self.memory - max(own_memory(), IDLE)) // WHOLE
+    def at_once(self, goal: int) -> int:
+        """Triangles that this process can take, to simplify them to so many."""
+        return max((self.memory - max(own_memory(), IDLE) - FITTED * goal) // WHOLE, 0)
 
 
 @dataclass(frozen=True)
@@ -133,7 +132,7 @@ def simplify_large(source: Source, target: Callable[[int], int], options: Mappin
     MeshError
         The memory is too little, the mesh is not valid, or a worker failed.
     """
-    if plan.in_cell < _LEAST_CELL:
+    if plan.in_cell() < _LEAST_CELL:
         raise MeshError(f"{plan.memory / 2**20:.0f} MiB are too little for {plan.workers} worker(s): raise "
                         "--memory-limit or lower --workers")
     before = sum(len(block) for block in source.blocks(_block(plan)))
@@ -141,7 +140,7 @@ def simplify_large(source: Source, target: Callable[[int], int], options: Mappin
         raise MeshError("the mesh has no faces: there is nothing to simplify")
     goal = target(before)
     left, joined = before, source
-    for number, wanted in enumerate(_goals(before, goal, plan.at_once)):
+    for number, wanted in enumerate(_goals(before, goal, plan.at_once(min(goal, before)))):
         place = folder / f"round_{number}"
         joined = _round(joined, left, wanted, options, place, number, plan, last=wanted == goal)
         if number:
@@ -151,7 +150,7 @@ def simplify_large(source: Source, target: Callable[[int], int], options: Mappin
         if now >= left and now > goal:
             raise MeshError(f"the cells cannot be simplified below {now} triangles: raise --memory-limit")
         left = now
-    if not isinstance(joined, Joined) or left > goal and left <= plan.at_once:
+    if not isinstance(joined, Joined) or left > goal and left <= plan.at_once(goal):
         return _finish(joined, goal, before, options, plan)
     short = (f"stopped at {left} of {goal} triangles: no further edge can go without changing the topology",)
     return Large(joined.vertices, joined.faces, lambda: joined.blocks(_block(plan)), before, left,
@@ -177,8 +176,10 @@ def _round(source: Source, before: int, wanted: int, options: Mapping[str, Any],
            plan: Plan, *, last: bool) -> Joined:
     """Simplify the cells of a mesh to so many triangles in all."""
     folder.mkdir()
-    counts, scale = deal(source, folder, before, plan.in_cell * 3 // 4, CUTS[number % len(CUTS)], _block(plan))
-    if counts.max() > plan.in_cell * 1.3:
+    fit = last and bool(options.get("refit", True))
+    most = plan.in_cell(wanted / before if fit else 0.0)
+    counts, scale = deal(source, folder, before, most * 3 // 4, CUTS[number % len(CUTS)], _block(plan))
+    if counts.max() > most * 1.3:
         raise MeshError(f"{counts.max()} triangles lie too close together for a cell: raise --memory-limit")
     cells = np.flatnonzero(counts).tolist()
     common = {"folder": str(folder)}
@@ -193,7 +194,7 @@ def _round(source: Source, before: int, wanted: int, options: Mapping[str, Any],
         plan.tell(f"cell {len(ladders)} of {len(cells)}")
     full = [cell for cell in cells if ladders[cell]["left"][0]]
     shares = share([ladders[cell] for cell in full], wanted)
-    cuts = [{**common, "do": "cut", "cell": cell, "count": count, "fit": last and options.get("refit", True)}
+    cuts = [{**common, "do": "cut", "cell": cell, "count": count, "fit": fit}
             for cell, count in zip(full, shares, strict=True)]
     for cell, _ in zip(full, _checked(plan.run(cuts)), strict=True):
         (folder / f"record_{cell}.npz").unlink()
