@@ -8,6 +8,7 @@ import os
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 import bpy
 import numpy as np
@@ -53,7 +54,7 @@ def _value(text: str) -> object:
         return text
 
 
-def compare(path: Path, ratio: float, pictures: Path | None, options: dict[str, object]) -> list[str]:
+def compare(path: Path, ratio: float, pictures: Path | None, options: dict[str, Any]) -> list[str]:
     """Simplify every mesh of a file, by both, to the same counts; give lines of the table."""
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     READERS[path.suffix.lower()](path)
@@ -173,8 +174,7 @@ def _weights(surface: Surface, face: Arrays, points: Arrays) -> Arrays:
 
 
 def _samples(surface: Surface) -> tuple[Arrays, Arrays]:
-    points, face, _ = face_samples(surface.points, surface.faces, SAMPLES, np.random.default_rng(0))
-    return points, face
+    return face_samples(surface.points, surface.faces, SAMPLES, np.random.default_rng(0))[:2]
 
 
 def uv_error(_: MeshArrays, obj: bpy.types.Object, mesh: bpy.types.Mesh) -> float | None:
@@ -195,7 +195,7 @@ def flipped(_: MeshArrays, obj: bpy.types.Object, mesh: bpy.types.Mesh) -> float
     if before is None or after is None:
         return None
     middle = surface.points[surface.faces].mean(axis=1)
-    _, face, _ = ClosestPoints(original.points, original.faces).query(middle)
+    face = ClosestPoints(original.points, original.faces).query(middle)[1]
     was, now = _area(before)[face], _area(after)
     return float(((was * now < 0) & (np.abs(now) > 1e-10)).sum())
 
@@ -232,7 +232,7 @@ def material_error(_: MeshArrays, obj: bpy.types.Object, mesh: bpy.types.Mesh) -
         return None
     original, surface = Surface(obj.data), Surface(mesh)
     points, face = _samples(surface)
-    _, near, _ = ClosestPoints(original.points, original.faces).query(points)
+    near = ClosestPoints(original.points, original.faces).query(points)[1]
     one, other = (_materials(m) for m in (mesh, obj.data))
     return float((one[face] != other[near]).mean())
 
@@ -252,7 +252,7 @@ def key_error(source: MeshArrays, _: bpy.types.Object, mesh: bpy.types.Mesh) -> 
     original = ClosestPoints(source.keys.neutral.astype(np.float64), source.triangles)
     neutral = np.zeros(len(mesh.vertices) * 3)
     mesh.shape_keys.key_blocks[0].points.foreach_get("co", neutral)
-    closest, face, _ = original.query(neutral.reshape(-1, 3))
+    closest, face, _squared = original.query(neutral.reshape(-1, 3))
     a, b, c = source.keys.neutral[source.triangles[face]].transpose(1, 0, 2).astype(np.float64)
     solved = np.einsum("ijk,ik->ij", np.linalg.pinv(np.stack((b - a, c - a), axis=-1)), closest - a)
     weights = np.concatenate((1 - solved.sum(axis=1, keepdims=True), solved), axis=1)
