@@ -29,7 +29,7 @@ VARIANTS: dict[str, dict[str, Any]] = {
     "all as printed": {"preset": "paper"},
 }
 LEVELS = (0.2, 0.05)
-LARGEST = 60_000  # triangles
+LARGEST = 30_000  # triangles
 FIGURES = {"maximum": "symmetric maximum", "mean": "mean", "normal": "normals"}
 
 
