@@ -15,6 +15,7 @@ from .client_files import CLIENT
 
 _THREE = ("three.core.js", "three.module.js")
 _IMPORT = re.compile(r"^import \{([^}]*)\} from '\./([\w.]+)';\n", flags=re.MULTILINE)
+_LATER = re.compile(r"import\('\./([\w.]+)'\)")
 _EXPORT = re.compile(r"^export (?=(?:async )?(?:function|class|const) (\w+))", flags=re.MULTILINE)
 _MAGIC = b"\x89ESOPM\r\n"
 
@@ -110,8 +111,8 @@ def _collect(name: str, parts: dict[str, str]) -> None:
     if name in parts or name in _THREE:
         return
     text = (CLIENT / name).read_text(encoding="utf-8")
-    for _, needed in _IMPORT.findall(text):
+    for needed in [name for _, name in _IMPORT.findall(text)] + _LATER.findall(text):
         _collect(needed, parts)
     names = ", ".join(_EXPORT.findall(text))
-    body = _EXPORT.sub("", _IMPORT.sub(r"const {\1} = modules['\2'];\n", text))
+    body = _EXPORT.sub("", _LATER.sub(r"modules['\1']", _IMPORT.sub(r"const {\1} = modules['\2'];\n", text)))
     parts[name] = f"modules['{name}'] = (() => {{\n{body}return {{ {names} }};\n}})();\n"

@@ -7,7 +7,8 @@ import { Mesh } from './mesh.js';
 
 const FIRST = 8192; // bytes asked for at first: the first picture comes from them
 const PATIENCE = 400; // milliseconds that the first picture waits for more than the base
-const QUIET = 120; // milliseconds at least between pictures while more comes at once
+const QUIET = 120; // milliseconds at least between pictures while more comes, where the next has four times as much
+const LONG = 400; // and at most
 const STEP = 250; // milliseconds between steps where a slow line makes a batch's splits last until the next
 const now = () => performance.now();
 const { port1, port2 } = new MessageChannel();
@@ -336,7 +337,8 @@ export class Stream {
       return;
     }
     const open = this.rows.find((row) => !row.done && this.wanted(row));
-    const left = (this.posted ?? -QUIET) + QUIET - now();
+    const pause = this.there() < 4 * this.shown ? LONG : QUIET; // all of them together cost little more than the last
+    const left = (this.posted ?? -LONG) + pause - now();
     if (open && left > 0 && !this.hurry) {
       this.quiet ??= setTimeout(() => {
         this.quiet = undefined;

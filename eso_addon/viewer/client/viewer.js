@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // <eso-viewer src="mesh.esopm">, or one tag: <script type="module" src="viewer.js" data-src="mesh.esopm"></script>
 import { Panel, countText } from './panel.js';
-import { View } from './view.js';
 
 const NUMBERS = { budget: 0, frame: 0, error: 0, memory: 0, level: 1 };
 const WORDS = { colours: 'material', shading: 'smooth', up: 'z', theme: 'auto', wire: '', paused: '' };
@@ -67,11 +66,19 @@ class EsoViewer extends HTMLElement {
     panel.wire(settings.wire);
     panel.find('.level').value = 1000 * settings.level;
     panel.state('loading');
+    this.open();
+    this.ready = this.makeView(); // while the worker is at work already
+  }
+
+  async makeView() {
+    const { panel, settings } = this;
     try {
+      const { View } = await import('./view.js');
       this.view = new View(panel.canvas, {
         drawn: (time) => this.drawn(time), moved: () => this.look(), below: () => panel.height(),
       });
     } catch {
+      this.worker.terminate();
       panel.state('');
       panel.message('This browser cannot draw in 3D: WebGL is missing or switched off.', false);
       this.say('failed');
@@ -85,12 +92,14 @@ class EsoViewer extends HTMLElement {
     this.view.look({ wire: settings.wire, colours: settings.colours, shading: settings.shading });
     this.view.turnUp(settings.up);
     this.applyTheme();
-    this.open();
   }
 
   open() {
     this.worker = makeWorker();
-    this.worker.onmessage = ({ data }) => this.heard(data);
+    this.worker.onmessage = async ({ data }) => {
+      await this.ready;
+      if (this.view) this.heard(data);
+    };
     this.worker.onerror = (event) => {
       event.preventDefault();
       this.panel.message('The page has come to a halt: load it anew.', false);
@@ -228,13 +237,13 @@ class EsoViewer extends HTMLElement {
     const number = name in NUMBERS;
     this.settings[name] = number ? Math.max(Number.parseFloat(value) || 0, 0) : value;
     this.panel.setting(name, this.settings[name]);
-    if (name === 'colours' || name === 'shading') this.view.look({ [name]: value });
-    else if (name === 'up') this.view.turnUp(value);
+    if (name === 'colours' || name === 'shading') this.view?.look({ [name]: value });
+    else if (name === 'up') this.view?.turnUp(value);
     else if (name === 'frame') {
       this.frames = [];
       this.cap = undefined;
       this.wish({ cap: this.settings.frame ? 2e5 : Infinity });
-      this.view.redraw();
+      this.view?.redraw();
     } else this.wish({ [name]: this.settings[name] });
     this.look();
   }
@@ -311,7 +320,7 @@ class EsoViewer extends HTMLElement {
   }
 
   say(name, detail) {
-    this.dispatchEvent(new CustomEvent(`eso-${name}`, { detail }));
+    this.dispatchEvent(new CustomEvent(`eso-${name}`, { detail, bubbles: true, composed: true }));
   }
 }
 
