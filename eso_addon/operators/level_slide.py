@@ -6,12 +6,10 @@ from typing import Any
 
 import bpy
 
-from ..jobs.modal import EngineOperator
-from ..settings.options import SimplifyOptions
 from ..settings.scene import on_level
 from . import shown
 from .polls import poll_with, why_not_simplify
-from .simplify import OBJECT_OT_eso_simplify
+from .simplify import SimplifyReading
 
 # What stays the user's own while the slider is out, beside what is over the sidebar.
 _VIEW_EVENTS = {"MIDDLEMOUSE", "WHEELUPMOUSE", "WHEELDOWNMOUSE", "MOUSEMOVE", "TRACKPADPAN", "TRACKPADZOOM"}
@@ -32,17 +30,14 @@ def show_level(context: bpy.types.Context) -> None:
         _sessions[-1].draw_level(context.window_manager.eso_last_run.level)
 
 
-class OBJECT_OT_eso_level_slide(EngineOperator, SimplifyOptions, bpy.types.Operator):
+class OBJECT_OT_eso_level_slide(SimplifyReading, bpy.types.Operator):
     """Drag through all levels of the active mesh; where the slider rests, the level becomes an object"""
 
     bl_idname = "object.eso_level_slide"
     bl_label = "ESO Level Slider"
     bl_options = {"REGISTER", "UNDO", "INTERNAL"}
 
-    # As of Simplify, whose `prepare` is used.
-    _object: Any
-    _source: Any
-    # The session's own: the levels once they are there, what was made of one, and how it is to end.
+    # The levels once they are there, what was made of one, and how it is to end.
     faces: int
     ending: str
     milliseconds: list[float]
@@ -64,9 +59,9 @@ class OBJECT_OT_eso_level_slide(EngineOperator, SimplifyOptions, bpy.types.Opera
 
     def prepare(self, context: bpy.types.Context) -> Any:  # noqa: ANN401 - as of Simplify
         """Read the active mesh; the engine runs beside the window unless its last run was this one."""
-        self.target, self.ratio, self.refit, self.in_place = "ratio", 1.0, False, False
+        self.target, self.ratio, self.refit, self.in_place, self.only_selected = "ratio", 1.0, False, False, False
         self._result_name, self._view, self.ending, self.milliseconds = "", None, "", []
-        return OBJECT_OT_eso_simplify.prepare(self, context)
+        return super().prepare(context)
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Wait for the engine, then for the slider."""
@@ -125,8 +120,8 @@ class OBJECT_OT_eso_level_slide(EngineOperator, SimplifyOptions, bpy.types.Opera
         self._remove_result()
         self._object.hide_set(False)
         context.view_layer.objects.active = self._object
-        names = set(SimplifyOptions.__annotations__) | set(SimplifyOptions.__mro__[1].__annotations__)
-        options = {name: getattr(self, name) for name in names}
+        taken = bpy.ops.object.eso_simplify.get_rna_type().properties
+        options = {name: getattr(self, name) for name, kind in taken.items() if not kind.is_readonly}
         options.update(target="count", faces_target=max(self.faces, 1))
         bpy.ops.object.eso_simplify("EXEC_DEFAULT", False, **options)
         self._result_name = context.view_layer.objects.active.name

@@ -22,32 +22,12 @@ from .probing import known_error, probe_later, with_errors_if_run
 from .reports import error_text, notes_of, tell, tell_error, triangles
 
 
-class OBJECT_OT_eso_simplify(EngineOperator, SimplifyOptions, bpy.types.Operator):
-    """Make a version of the active mesh with fewer triangles that keeps its shape and features"""
-
-    bl_idname = "object.eso_simplify"
-    bl_label = "ESO Simplify"
-    bl_options = {"REGISTER", "UNDO", "PRESET"}
+class SimplifyReading(EngineOperator, SimplifyOptions):
+    """What Simplify and the level slider share: read the active mesh, run the engine or replay its last run."""
 
     _object: bpy.types.Object
     _source: MeshArrays
     _live: list[str]
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Need an active mesh object."""
-        return poll_with(cls, why_not_simplify(context))
-
-    def draw(self, _context: bpy.types.Context) -> None:
-        """Draw the redo panel."""
-        self.layout.use_property_split = True
-        self.draw_target(self.layout)
-        self.layout.prop(self, "in_place")
-        if self.in_place:
-            self.layout.prop(self, "all_users")
-        self.layout.prop(self, "only_selected")
-        self.draw_keep(self.layout)
-        self.draw_engine(self.layout)
 
     def prepare(self, context: bpy.types.Context) -> Steps[list[SimplifyResult]]:
         """Read the active mesh."""
@@ -77,6 +57,30 @@ class OBJECT_OT_eso_simplify(EngineOperator, SimplifyOptions, bpy.types.Operator
             regions["locked"] = outside | regions.get("locked", False)
             target = target_for_selection(source, target)
         return {f"{name}s": [value] for name, value in target.items()}, regions
+
+
+class OBJECT_OT_eso_simplify(SimplifyReading, bpy.types.Operator):
+    """Make a version of the active mesh with fewer triangles that keeps its shape and features"""
+
+    bl_idname = "object.eso_simplify"
+    bl_label = "ESO Simplify"
+    bl_options = {"REGISTER", "UNDO", "PRESET"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Need an active mesh object."""
+        return poll_with(cls, why_not_simplify(context))
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        """Draw the redo panel."""
+        self.layout.use_property_split = True
+        self.draw_target(self.layout)
+        self.layout.prop(self, "in_place")
+        if self.in_place:
+            self.layout.prop(self, "all_users")
+        self.layout.prop(self, "only_selected")
+        self.draw_keep(self.layout)
+        self.draw_engine(self.layout)
 
     def finish(self, context: bpy.types.Context, results: list[SimplifyResult]) -> None:
         """Write the result beside the source, or in its place."""
