@@ -176,7 +176,8 @@ def _chain(results: list[SimplifyResult], counts: list[int], mesh: Mesh, goals: 
             messages.append(f"level {index} is left out: it would be a copy of the level before, which has "
                             f"{len(levels[-1].result.faces)} triangles")
             continue
-        distance = (goals.screen.distance_for_size(extent, goals.values[index]) if goals.kind == "screen"
-                    else goals.screen.distance_for_error(result.error))
+        distance = goals.screen.distance_for_error(result.error)  # which is probed here, not in the window's thread
+        if goals.kind == "screen":
+            distance = goals.screen.distance_for_size(extent, goals.values[index])
         levels.append(Level(result, max(distance, levels[-1].distance if levels else 0.0)))
     return Chain(tuple(levels), tuple(messages))

@@ -104,16 +104,16 @@ class OBJECT_OT_eso_lod_generate(EngineOperator, LodOptions, bpy.types.Operator)
     def _tell(self, context: bpy.types.Context, chains: list[Chain]) -> None:
         lines = []
         for source, chain in zip(self._sources, chains, strict=True):
-            before = len(source.arrays.triangles)
-            many = len(self._sources) > 1
+            before, many = len(source.arrays.triangles), len(self._sources) > 1
             lines.append(f"{source.objects[0].name}: {before:,} triangles" if many else f"{before:,} triangles")
-            name = PROFILES[self.profile].scene_name
             lines += [
-                f"{name('', number).lstrip('_')} {len(level.result.faces):,} "
+                f"{self._label(number)} {len(level.result.faces):,} "
                 f"({len(level.result.faces) / max(before, 1):.1%}), error {level.result.error:.3g}, "
                 f"from {level.distance:.3g} on"
                 for number, level in enumerate(chain.levels)
             ]
+        if len(self._sources) > _MOST_TOLD:
+            lines = self._sums(chains)
         notes = [note for source, chain in zip(self._sources, chains, strict=True)
                  for note in notes_of(source.arrays.left_behind, chain)]
         title = f"Levels of {self._sources[0].objects[0].name}"
@@ -122,7 +122,22 @@ class OBJECT_OT_eso_lod_generate(EngineOperator, LodOptions, bpy.types.Operator)
              dict.fromkeys(notes))
 
 
+    def _label(self, number: int) -> str:
+        return PROFILES[self.profile].scene_name("", number).lstrip("_")
+
+    def _sums(self, chains: list[Chain]) -> list[str]:
+        """Give for each level the triangles of all objects together; those with fewer levels count with their last."""
+        copies = [len(source.objects) for source in self._sources]
+        most = max(len(chain.levels) for chain in chains)
+        sums = [sum(len(chain.levels[min(number, len(chain.levels) - 1)].result.faces) * times
+                    for chain, times in zip(chains, copies, strict=True)) for number in range(most)]
+        before = sum(len(source.arrays.triangles) * times for source, times in zip(self._sources, copies, strict=True))
+        return [f"{before:,} triangles in all",
+                *(f"{self._label(number)} {total:,} ({total / before:.1%})" for number, total in enumerate(sums))]
+
+
 OPERATOR = OBJECT_OT_eso_lod_generate
+_MOST_TOLD = 4  # objects whose levels are listed one by one
 
 
 def _collection(context: bpy.types.Context, name: str) -> bpy.types.Collection:

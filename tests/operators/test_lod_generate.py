@@ -175,6 +175,7 @@ def test_a_budget_over_forty_props() -> None:
     found = [o["eso_triangles"] for o in level_objects()]
     assert len(found) == 40
     assert 2001 * 0.999 <= sum(found) <= 2001
+    assert f"LOD0 {sum(found):,} (" in bpy.context.window_manager.eso_last_run.lines
 
 
 def test_levels_by_size_on_screen_know_where_they_begin() -> None:
