@@ -65,6 +65,16 @@ def main(words: Sequence[str] | None = None) -> int:
 def run(folder: Path | None, out: Path, say: Callable[[str], None], *, short: bool = False) -> int:
     """Run every section and write the page; a section that fails is named there, and the rest is there."""
     models, missing = find_models(folder)
+    for name, model in list(models.items()):
+        try:
+            if not model.triangles:
+                raise ValueError("it has no faces")
+        except Exception as error:  # a file that cannot be read is as good as missing
+            missing[name] = f"{type(error).__name__}: {error}"
+            del models[name]
+    if "cow" not in models:
+        say("the cow is not at hand: pymeshlab, in whose wheel it is, is not installed")
+        return 1
     if short:
         models, missing = {"cow": models["cow"]}, {}
     say(f"{len(models)} models: {', '.join(models)}" + (f"; not at hand: {', '.join(missing)}" if missing else ""))
@@ -80,6 +90,8 @@ def run(folder: Path | None, out: Path, say: Callable[[str], None], *, short: bo
                 say(f"{number} of {len(SECTIONS)}: {title}")
                 try:
                     sections.append(make(context))
+                    sections[-1].problems += context.troubles
+                    context.troubles.clear()
                 except Exception as error:  # named on the page, with where; the rest goes on
                     failures += 1
                     traceback.print_exc()

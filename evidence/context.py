@@ -30,6 +30,7 @@ class Context:
     say: Callable[[str], None]
     short: bool = False
     failed: list[str] = field(default_factory=list)
+    troubles: list[str] = field(default_factory=list)  # pictures that failed in the section that is being made
     _levels: dict[tuple[str, str, int], Level] = field(default_factory=dict)
 
     @property
@@ -57,8 +58,13 @@ class Context:
 
     def picture(self, mesh: Mesh, camera: Camera, wide: int = 640, *, colors: np.ndarray | None = None,
                 wire: bool = True) -> np.ndarray:
-        """Render a mesh; small where the run is short."""
-        return render(mesh, camera, wide // 4 if self.short else wide, colors=colors, wire=wire)
+        """Render a mesh, small where the run is short; where that fails the page names it and shows a grey field."""
+        wide = wide // 4 if self.short else wide
+        try:
+            return render(mesh, camera, wide, colors=colors, wire=wire)
+        except Exception as error:
+            self.troubles.append(f"a picture of {len(mesh[1]):,} triangles: {type(error).__name__}: {error}")
+            return np.full((round(wide * camera.ratio), wide, 3), 200, np.uint8)
 
     def levels(self) -> dict[tuple[str, str, int], Level]:
         """Return the levels of the ESO paper's models by model, variant and percentage; made once."""

@@ -13,6 +13,7 @@ pytest.importorskip("pymeshlab")
 
 from evidence import __main__ as papers
 from evidence import models, page, printed, raster, reconstruction
+from evidence.context import Context
 from tests.core import shapes
 
 LEVELS = (20, 10)
@@ -107,6 +108,24 @@ def test_a_section_that_fails_is_named_and_the_rest_is_there(tmp_path: Path, mon
     assert "All is well." in text
     assert "dragon_25k.obj" in text  # a model that is missing is named
     assert json.loads((tmp_path / "papers.json").read_text(encoding="utf-8"))["2-fine"] == [1.0, None]
+
+
+def test_a_picture_or_a_model_that_fails_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+                                                 sample_meshes: Path) -> None:
+    def draw(context: Context) -> page.Section:
+        cow = context.models["cow"]
+        return page.Section("1. Drawn", [page.Pictures("The cow.", [(context.picture(cow.mesh, cow.camera), "cow")])])
+
+    def fail(*_: object, **__: object) -> None:
+        raise MemoryError("no room for a picture")
+
+    monkeypatch.setattr(papers, "SECTIONS", {"Drawn": draw})
+    monkeypatch.setattr("evidence.context.render", fail)
+    (tmp_path / "dragon_25k.obj").write_text("this is no mesh\n")
+    assert papers.run(tmp_path, tmp_path / "out", lambda _: None) == 0
+    text = (tmp_path / "out" / "index.html").read_text(encoding="utf-8")
+    assert "no room for a picture" in text
+    assert "dragon (" in text
 
 
 def test_the_printed_tables_agree_with_each_other() -> None:
