@@ -8,8 +8,12 @@ import json
 import os
 import re
 from collections.abc import Callable, Sequence
+from contextlib import closing
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from .farm.ledger import Ledger
 
 _CHILD = f"{__package__}.cli_child"
 _OWN = ("input", "output", "scheduler", "workers", "timeout", "memory_limit", "format", "report", "run")
@@ -81,26 +85,25 @@ def run(args: argparse.Namespace, formats: Sequence[str]) -> None:
     if not wanted:
         if not args.output.is_dir():
             raise ValueError(f"{args.output} is no folder: give that of a batch's results")
-        _tell(args.output, Ledger(args.output).rows())
+        with closing(Ledger(args.output)) as ledger:
+            _tell(args.output, ledger.rows())
         return
     if not args.input.is_dir():
         raise ValueError(f"{args.input} is no folder: give that of the meshes")
     args.output.mkdir(parents=True, exist_ok=True)
-    with sole_run(args.output):
-        _run(args, formats)
+    with sole_run(args.output), closing(Ledger(args.output.resolve())) as ledger:
+        _run(args, formats, ledger)
 
 
-def _run(args: argparse.Namespace, formats: Sequence[str]) -> None:
+def _run(args: argparse.Namespace, formats: Sequence[str], ledger: Ledger) -> None:
     from . import __version__
     from .farm.batch import run_batch, stopping_well
-    from .farm.ledger import Ledger
     from .farm.library import list_library, sweep
     from .farm.progress import Bar
 
     words = {name: value for name, value in vars(args).items() if name not in _OWN} | {"threads": 1}
     settings = json.dumps({**words, "format": args.format}, sort_keys=True)
     entries = list_library(args.input, args.output, formats, args.format)
-    ledger = Ledger(args.output.resolve())
     rows = ledger.rows()
     todo = [entry for entry in entries
             if not ledger.is_done(rows.get(entry.name), entry.digest, settings, __version__)]
@@ -116,8 +119,8 @@ def _run(args: argparse.Namespace, formats: Sequence[str]) -> None:
     finally:
         bar.close()
         sweep(args.output)
-    found = {entry.name: ledger.rows()[entry.name] for entry in entries}
-    ledger.close()
+    rows = ledger.rows()
+    found = {entry.name: rows[entry.name] for entry in entries}
     for row in found.values():
         if row.error:
             print(f"{row.path}: {row.error}")

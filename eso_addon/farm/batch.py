@@ -19,6 +19,7 @@ from .ledger import Ledger, Row
 from .library import Entry
 
 _LOST = 5  # times that a file is handed out anew after Dask gave up on the workers that had it
+PATIENCE = 15.0  # seconds to wait for a scheduler
 _NEEDED = "a batch runs on Dask, which is not there: pip install 'eso-lod[farm]' (or pip install dask distributed)"
 
 
@@ -158,7 +159,7 @@ def client_of(farm: Farm) -> Iterator[Any]:
         stack.enter_context(dask.config.set(quiet))
         if farm.scheduler:
             try:
-                client = Client(farm.scheduler, timeout=15)
+                client = Client(farm.scheduler, timeout=PATIENCE)
             except (OSError, ValueError, TimeoutError) as error:
                 raise ValueError(f"no Dask scheduler answers at {farm.scheduler}: start one with `dask scheduler` "
                                  f"({error})") from None
