@@ -196,6 +196,8 @@ export class Stream {
     this.states = head.meshes.map(() => ({ row: null, next: null }));
     this.rows = head.rows;
     this.head = head;
+    const base = head.rows[head.meshes.length - 1].total;
+    if (this.wish.level < 1) this.wish.faces = Math.round(base * (faces / base) ** this.wish.level);
     this.tell({
       type: 'head', meta: head.header.meta ?? {}, rows: head.rows.map(({ total, error, mesh }) => ({ total, error, mesh })),
       faces, bytes: head.end, tooMuch: head.rows.some((row) => row.tooMuch),

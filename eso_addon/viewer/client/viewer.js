@@ -104,11 +104,12 @@ class EsoViewer extends HTMLElement {
       event.preventDefault();
       this.panel.message('The page has come to a halt: load it anew.', false);
     };
-    const { budget, error, memory, paused, wire } = this.settings;
+    const { budget, error, level, memory, paused, wire } = this.settings;
+    this.asked = level;
     this.worker.postMessage({
       type: 'open', url: new URL(this.getAttribute('src') ?? '', document.baseURI).href,
       base64: document.getElementById(this.getAttribute('held'))?.textContent,
-      wish: { budget, error, paused, memory: memory * 1e6, cap: this.settings.frame ? 2e5 : Infinity },
+      wish: { budget, error, level, paused, memory: memory * 1e6, cap: this.settings.frame ? 2e5 : Infinity },
     });
     if (wire) this.worker.postMessage({ type: 'wire', on: true });
   }
@@ -152,7 +153,7 @@ class EsoViewer extends HTMLElement {
     }
     this.view.open(meshes, meta);
     if (tooMuch) this.panel.message('The memory of this device holds a coarser level only: that is shown.', false);
-    if (this.settings.level < 1) this.level(this.settings.level);
+    if (this.settings.level !== this.asked) this.level(this.settings.level); // moved before the header was there
     this.say('head');
   }
 
