@@ -295,7 +295,8 @@ def scene_overlays() -> Steps:
         yield from w.press_button(operator, x=x)
         yield from w.wait_for(lambda kind=kind: addon("operators.shown").is_shown(kind, bpy.context.object), 20, kind)
         yield from w.clear_sidebar()
-        assert colorful(w.part(w.picture(kind), w.region("WINDOW"))) > plain + 0.005, kind
+        share = colorful(w.part(w.picture(kind), w.region("WINDOW"))) - plain
+        assert share > (0.02 if kind == "weights" else 2e-4), (kind, share)  # lines are thin
     assert "eso_weight" in bpy.context.object.data.attributes
     bpy.context.scene.eso_lod.ratio = 0.05
     yield from w.press_button("object.eso_simplify")

@@ -72,7 +72,8 @@ def test_another_mesh_or_option_is_another_run(other: dict[str, Any]) -> None:
 def test_fingerprints_tell_contents_apart() -> None:
     values = [
         1, 1.0, "1", None, True, [1], [1, 1], {"a": 1}, {"b": 1}, np.zeros(3), np.zeros((3, 1)),
-        np.zeros(3, np.float32), np.arange(12.0).reshape(3, 4), np.arange(12.0).reshape(3, 4).T, np.zeros((0, 3)), [[1], 2], [[1, 2]],
+        np.zeros(3, np.float32), np.arange(12.0).reshape(3, 4), np.arange(12.0).reshape(3, 4).T, np.zeros((0, 3)),
+        [[1], 2], [[1, 2]],
     ]  # fmt: skip
     prints = [replay.fingerprint(value) for value in values]
     assert len(set(prints)) == len(values)

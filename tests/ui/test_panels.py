@@ -8,6 +8,7 @@ import bpy
 import pytest
 
 from eso_addon import operators, settings, ui
+from eso_addon import settings as settings_package
 from eso_addon.ui import menus, panels
 from tests.bridge.blender_scenes import activate, add_cube, add_sphere, linked_from_library
 
@@ -24,8 +25,11 @@ class Layout:
 
     column = split = row
 
-    def label(self, text: str = "") -> None:
+    def label(self, text: str = "", **_: object) -> None:
         self.drawn.append(("label", text, True))
+
+    def progress(self, factor: float, text: str) -> None:
+        self.drawn.append(("progress", text, True))
 
     def prop(self, data: bpy.types.bpy_struct, name: str, **_: object) -> None:
         assert name in data.bl_rna.properties
@@ -36,9 +40,10 @@ class Layout:
 
     def operator(self, name: str, **_: object) -> SimpleNamespace:
         self.drawn.append(("operator", name, self.enabled))
-        return SimpleNamespace(bl_rna=getattr(bpy.ops.object, name.split(".")[1]).get_rna_type())
+        group, word = name.split(".")
+        return SimpleNamespace(bl_rna=getattr(getattr(bpy.ops, group), word).get_rna_type())
 
-    def menu(self, name: str) -> None:
+    def menu(self, name: str, **_: object) -> None:
         self.drawn.append(("menu", name, True))
 
     def separator(self) -> None:
@@ -49,7 +54,8 @@ def drawn_by(panel: type) -> list[tuple[str, str, bool]]:
     drawn: list[tuple[str, str, bool]] = []
     context = SimpleNamespace(
         **{name: getattr(bpy.context, name) for name in
-           ("scene", "mode", "active_object", "selected_objects", "view_layer", "window_manager", "preferences")},
+           ("scene", "mode", "active_object", "selected_objects", "view_layer", "window_manager", "preferences",
+            "collection")},
         region=SimpleNamespace(width=280),
     )  # fmt: skip
     panel.draw(SimpleNamespace(layout=Layout(drawn)), context)
@@ -87,13 +93,13 @@ def test_counts_before_and_after_are_shown_before_the_click() -> None:
 
 
 def test_what_cannot_run_is_greyed_with_the_reason() -> None:
-    assert buttons(panels.VIEW3D_PT_eso_simplify) == {"object.eso_simplify": False}
+    assert buttons(panels.VIEW3D_PT_eso_simplify)["object.eso_simplify"] is False
     assert "No active object" in labels(panels.VIEW3D_PT_eso_simplify)
-    assert buttons(panels.VIEW3D_PT_eso_levels) == {"object.eso_lod_generate": False}
-    assert buttons(panels.VIEW3D_PT_eso_measure) == {"object.eso_measure": False}
+    assert buttons(panels.VIEW3D_PT_eso_levels)["object.eso_lod_generate"] is False
+    assert buttons(panels.VIEW3D_PT_eso_measure)["object.eso_measure"] is False
     add_cube()
-    assert buttons(panels.VIEW3D_PT_eso_simplify) == {"object.eso_simplify": True}
-    assert buttons(panels.VIEW3D_PT_eso_levels) == {"object.eso_lod_generate": True}
+    assert buttons(panels.VIEW3D_PT_eso_simplify)["object.eso_simplify"] is True
+    assert buttons(panels.VIEW3D_PT_eso_levels)["object.eso_lod_generate"] is True
     assert "Select the original" in labels(panels.VIEW3D_PT_eso_measure)
 
 
@@ -102,10 +108,57 @@ def test_in_place_is_greyed_with_the_reason_for_linked_data(tmp_path: Path) -> N
     obj = linked_from_library(tmp_path, "objects", "Far")
     bpy.context.scene.collection.objects.link(obj)
     activate(obj)
-    assert buttons(panels.VIEW3D_PT_eso_simplify) == {"object.eso_simplify": True}
+    assert buttons(panels.VIEW3D_PT_eso_simplify)["object.eso_simplify"] is True
     bpy.context.scene.eso_lod.in_place = True
-    assert buttons(panels.VIEW3D_PT_eso_simplify) == {"object.eso_simplify": False}
+    assert buttons(panels.VIEW3D_PT_eso_simplify)["object.eso_simplify"] is False
     assert "make it local" in labels(panels.VIEW3D_PT_eso_simplify)
+
+
+def test_a_run_that_goes_on_is_a_bar_in_place_of_the_buttons() -> None:
+    add_cube()
+    run = bpy.context.window_manager.eso_last_run
+    run.running, run.progress = "ESO Simplify", 0.25
+    assert ("progress", "25%", True) in drawn_by(panels.VIEW3D_PT_eso_simplify)
+    assert buttons(panels.VIEW3D_PT_eso_simplify) == {}
+    run.running = ""
+    assert "object.eso_simplify" in buttons(panels.VIEW3D_PT_eso_simplify)
+
+
+def test_levels_are_rows_of_the_text_that_operators_take() -> None:
+    settings = bpy.context.scene.eso_lod
+    settings.ratios = "0.5, 0.25"
+    assert list(settings.row_ratio)[:3] == pytest.approx([0.5, 0.25, 0])
+    settings.row_ratio[1] = 0.125
+    assert settings.ratios == "0.5, 0.125"
+    bpy.ops.scene.eso_level_add()
+    assert settings.ratios == "0.5, 0.125, 0.0625"
+    bpy.ops.scene.eso_level_remove()
+    bpy.ops.scene.eso_level_remove()
+    bpy.ops.scene.eso_level_remove()
+    assert settings.ratios == "0.5"
+    bpy.ops.scene.eso_level_set(name="Unity")
+    assert settings.profile == "unity"
+    assert len(settings.level_values()) == 4
+
+
+def test_figures_stand_beside_the_levels_before_and_after() -> None:
+    add_sphere()
+    settings = bpy.context.scene.eso_lod
+    settings.ratios = "0.5, 0.25"
+    assert "640" in labels(panels.VIEW3D_PT_eso_levels)
+    bpy.ops.object.eso_lod_generate(ratios="0.5, 0.25")
+    assert "±" in labels(panels.VIEW3D_PT_eso_levels)
+
+
+@pytest.mark.parametrize("name", ["Prop", "Character", "Scan", "Hard_Surface", "Web", "Paper"])
+def test_factory_presets_set_the_panel(name: str) -> None:
+    settings = bpy.context.scene.eso_lod
+    settings.rings, settings.weld = 7, False
+    folder = Path(settings_package.__file__).parent.parent / "presets" / "eso_lod"
+    exec(compile((folder / f"{name}.py").read_text(encoding="utf-8"), name, "exec"), {})
+    assert settings.weld
+    assert settings.rings != 7
+    assert (settings.preset == "paper") == (name == "Paper")
 
 
 def test_the_last_run_is_shown() -> None:
