@@ -20,6 +20,8 @@ NAMES = {SEAM: "seams", MATERIAL: "material borders", SHARP: "sharp edges"}
 _NEAR = {"uv": 1e-5, "color": 0.02, "value": 1e-3}
 # normals closer than five degrees are one
 _NEAR_NORMAL = np.cos(np.radians(5))
+# UV triangles with less area than this part of their sides' squares run neither way
+_THIN = 1e-3
 # a layer that jumps at more of the edges has no lines, it is broken up everywhere
 _MOST = 0.5
 
@@ -120,12 +122,14 @@ def find_lines(mesh: Prepared, input_faces: Ints, attributes: AttributeSet, igno
                  "vertex": input_faces.ravel().take(corner).ravel()}
     for layer in attributes.layers:
         bits = _bits(layer) & ~ignored
-        if bits == 0 or (layer.domain == "vertex" and mesh.sheet is None):
+        if bits == 0 or (layer.domain == "vertex" and mesh.sheet is None and layer.kind != "uv"):
             continue
         if layer.domain == "edge":
             found = _marked(layer, mesh.vertex.take(attributes.edges), keys.take(one), count)
         else:
             found = _jumps(layer, at_corner[layer.domain].take(pairs))
+            if layer.kind == "uv":
+                found |= _folds(layer, at_corner[layer.domain].reshape(faces.shape), pairs)
         if found.sum() > max(_MOST * len(found), 12):
             messages.append(f"{layer.name} differs across most edges: it is carried, but holds none of them")
         else:
@@ -182,6 +186,16 @@ def _jumps(layer: Layer, elements: Ints) -> Bools:
             differ[where] = _apart(rows.take(one.take(where), axis=0), rows.take(other.take(where), axis=0))
         found |= differ
     return found
+
+
+def _folds(layer: Layer, elements: Ints, pairs: Ints) -> Bools:
+    """Tell the edges where a UV map turns back on itself, as where both sides of a thing share their texture."""
+    a, b, c = (layer.rows.take(row, axis=0).astype(np.float64) for row in elements)
+    one, other = b - a, c - a
+    area = one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0]
+    size = (one * one).sum(axis=1) + (other * other).sum(axis=1)
+    turn = np.sign(area) * (np.abs(area) > _THIN * size)
+    return turn.take(pairs[0] % len(turn)) * turn.take(pairs[2] % len(turn)) < 0
 
 
 def _apart(one: np.ndarray, other: np.ndarray) -> Bools:

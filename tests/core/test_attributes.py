@@ -200,3 +200,12 @@ def test_empty_layers_are_carried() -> None:
     assert layers[0].rows.shape == (len(VERTICES), 0)
     assert simplify(VERTICES, FACES, ratio=0.5, attributes={"none": np.zeros((len(VERTICES), 0))}).attributes[
         "none"].shape[1] == 0
+
+
+def test_a_texture_that_both_sides_share_is_not_folded_over() -> None:
+    vertices, faces = sheet(24, 24)
+    uv = np.abs(vertices[:, :2] - [12.0, -1.0])
+    result = simplify(vertices, faces, ratio=0.1, attributes={"uv": uv})
+    assert np.allclose(result.attributes["uv"], np.abs(result.vertices[:, :2] - [12.0, -1.0]), atol=0.05)
+    across = result.vertices[result.faces][..., 0]
+    assert (across.min(axis=1) >= 11.9).sum() + (across.max(axis=1) <= 12.1).sum() == len(result.faces)
