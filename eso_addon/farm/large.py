@@ -140,9 +140,12 @@ def simplify_large(source: Source, target: Callable[[int], int], options: Mappin
         raise MeshError("the mesh has no faces: there is nothing to simplify")
     goal = target(before)
     left, joined = before, source
-    for number, wanted in enumerate(_goals(before, goal, plan.at_once(min(goal, before)))):
+    goals = _goals(before, goal, plan.at_once(min(goal, before)))
+    # what is followed by the whole is fitted then; cells are fitted round by round, the first time to the original
+    fit = goal in goals and bool(options.get("refit", True))
+    for number, wanted in enumerate(goals):
         place = folder / f"round_{number}"
-        joined = _round(joined, left, wanted, options, place, number, plan, last=wanted == goal)
+        joined = _round(joined, left, wanted, options, place, number, plan, fit=fit)
         if number:
             shutil.rmtree(folder / f"round_{number - 1}")
         now = sum(len(block) for block in joined.faces())
@@ -173,10 +176,9 @@ def _block(plan: Plan) -> int:
 
 
 def _round(source: Source, before: int, wanted: int, options: Mapping[str, Any], folder: Path, number: int,
-           plan: Plan, *, last: bool) -> Joined:
+           plan: Plan, *, fit: bool) -> Joined:
     """Simplify the cells of a mesh to so many triangles in all."""
     folder.mkdir()
-    fit = last and bool(options.get("refit", True))
     most = plan.in_cell(wanted / before if fit else 0.0)
     counts, scale = deal(source, folder, before, most * 3 // 4, CUTS[number % len(CUTS)], _block(plan))
     if counts.max() > most * 1.3:
