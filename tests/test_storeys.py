@@ -29,12 +29,12 @@ OUTSIDE = {
     "progressive": {"numpy"},
     "files": {"numpy"},
     "bridge": {"numpy", *BLENDER},
-    "jobs": {*BLENDER},
+    "jobs": {"numpy", *BLENDER},
     "settings": {*BLENDER},
     "viewer": set(),
     "farm": {"numpy", "dask", "distributed", "psutil"},
     "operators": {"numpy", *BLENDER},
-    "ui": {"gpu", "gpu_extras", "blf", "bl_operators", "bl_ui", *BLENDER},
+    "ui": {"numpy", "gpu", "gpu_extras", "blf", "bl_operators", "bl_ui", *BLENDER},
 }
 MODULES = sorted(PACKAGE.rglob("*.py"))
 OTHERS = ("tests", "benchmarks", "demo", "scripts")

@@ -3,14 +3,19 @@
 # mypy: disable-error-code="valid-type"
 """The operator that measures how far the active mesh deviates from its original."""
 
+from collections.abc import Generator
+from typing import Any
+
 import bpy
 import numpy as np
 from bpy.props import BoolProperty, EnumProperty, IntProperty
 
 from ..bridge.read_mesh import MeshArrays, read_mesh
 from ..core.deviation import Deviation, measure_steps
+from ..jobs import second_opinion
 from ..jobs.modal import EngineOperator
 from ..jobs.worker import Steps
+from ..settings.preferences import preferences
 from .polls import measured_pair, poll_with, why_not_measure
 from .reports import tell
 
@@ -36,6 +41,7 @@ class OBJECT_OT_eso_measure(EngineOperator, bpy.types.Operator):
     )
 
     _title: str
+    _second: dict[str, float]
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -47,7 +53,16 @@ class OBJECT_OT_eso_measure(EngineOperator, bpy.types.Operator):
         original, simplified = measured_pair(context)
         self._title = f"{simplified.name} against {original.name}"
         one, other = self._read(original), self._read(simplified)
-        return measure_steps(one.vertices, one.triangles, other.vertices, other.triangles, samples=self.samples)
+        arrays = one.vertices, one.triangles, other.vertices, other.triangles
+        return self._both(arrays, ask=preferences().use_pymeshlab and second_opinion.is_there())
+
+    def _both(self, arrays: tuple[Any, Any, Any, Any], *, ask: bool) -> Generator[float, None, Deviation]:
+        """Measure, and let pymeshlab measure too where the preferences want it."""
+        self._second = {}
+        result = yield from measure_steps(*arrays, samples=self.samples)
+        if ask:
+            self._second = yield from second_opinion.second_opinion_steps(*arrays, self.samples)
+        return result
 
     def finish(self, context: bpy.types.Context, result: Deviation) -> None:
         """Report the figures; nothing is written."""
@@ -59,6 +74,7 @@ class OBJECT_OT_eso_measure(EngineOperator, bpy.types.Operator):
             f"normals {both.normal:.1f}°",
             f"original to simplified {result.forward.maximum:.3g}",
             f"simplified to original {result.backward.maximum:.3g}",
+            *(f"pymeshlab: {name} {value:.3g}" for name, value in self._second.items()),
             f"{self.seconds:.2f} s",
         ]
         tell(self, context, self._title, lines)

@@ -10,6 +10,7 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
 
 from ..core.screen import Screen
 from .keep_options import KeepOptions
+from .preferences import preferences
 
 _TARGETS = (
     ("ratio", "Ratio", "Keep this share of the triangles"),
@@ -120,6 +121,8 @@ class EngineOptions:
         options = {name: getattr(self, name) for name in names}
         if self.preset == "default":  # the paper does not refit
             options["refit"] = self.refit
+        if threads := preferences().threads:
+            options["threads"] = threads
         return options
 
 

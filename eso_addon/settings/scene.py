@@ -6,11 +6,13 @@
 from collections.abc import Callable
 
 import bpy
+from bpy.app.handlers import persistent
 from bpy.props import BoolProperty, FloatProperty, PointerProperty, StringProperty
 
 from .level_list import LevelList
 from .lod_options import LodOptions
 from .options import SimplifyOptions
+from .preferences import preferences
 
 # Called with the context when the level slider moves.
 on_level: list[Callable[[bpy.types.Context], None]] = []
@@ -52,6 +54,14 @@ class ESO_PG_last_run(bpy.types.PropertyGroup):
         self.lines = "\n".join(lines)
 
 
+@persistent
+def start_with_profile(*_: object) -> None:
+    """Let scenes that have not chosen an engine start with the one of the preferences."""
+    for scene in bpy.data.scenes:
+        if scene.library is None and not scene.eso_lod.is_property_set("profile"):
+            scene.eso_lod.profile = preferences().profile
+
+
 _CLASSES = (ESO_PG_settings, ESO_PG_last_run)
 
 
@@ -61,10 +71,13 @@ def register() -> None:
         bpy.utils.register_class(cls)
     bpy.types.Scene.eso_lod = PointerProperty(type=ESO_PG_settings)
     bpy.types.WindowManager.eso_last_run = PointerProperty(type=ESO_PG_last_run)
+    bpy.app.handlers.load_post.append(start_with_profile)
 
 
 def unregister() -> None:
     """Take them away again."""
+    if start_with_profile in bpy.app.handlers.load_post:
+        bpy.app.handlers.load_post.remove(start_with_profile)
     del bpy.types.WindowManager.eso_last_run
     del bpy.types.Scene.eso_lod
     for cls in reversed(_CLASSES):
