@@ -71,8 +71,8 @@ class OBJECT_OT_eso_simplify(SimplifyReading, bpy.types.Operator):
         """Need an active mesh object."""
         return poll_with(cls, why_not_simplify(context))
 
-    def draw(self, _context: bpy.types.Context) -> None:
-        """Draw the redo panel."""
+    def draw(self, context: bpy.types.Context) -> None:
+        """Draw the redo panel; with refit it says how long each change takes."""
         self.layout.use_property_split = True
         self.draw_target(self.layout)
         self.layout.prop(self, "in_place")
@@ -81,6 +81,9 @@ class OBJECT_OT_eso_simplify(SimplifyReading, bpy.types.Operator):
         self.layout.prop(self, "only_selected")
         self.draw_keep(self.layout)
         self.draw_engine(self.layout)
+        if self.refit and self.preset == "default":
+            seconds = context.window_manager.eso_last_run.seconds
+            self.layout.label(text=f"Refit: {seconds:.1f} s", icon="TIME", translate=False)
 
     def finish(self, context: bpy.types.Context, results: list[SimplifyResult]) -> None:
         """Write the result beside the source, or in its place."""
@@ -104,6 +107,7 @@ class OBJECT_OT_eso_simplify(SimplifyReading, bpy.types.Operator):
             objects.select_only([new], context.view_layer)
             objects.join_local_view([new], context.space_data)
         figures = [triangles(before, after), error_text(error), f"{self.seconds:.2f} s"]
+        context.window_manager.eso_last_run.seconds = self.seconds
         tell(self, context, f"Simplified {obj.name}", figures, notes_of(self._source.left_behind, result))
         if error is None:  # a replay is shown at once, its error follows
             name = obj.name if self.in_place else new.name
