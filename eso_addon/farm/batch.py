@@ -164,14 +164,23 @@ def client_of(farm: Farm) -> Iterator[Any]:
                 raise ValueError(f"no Dask scheduler answers at {farm.scheduler}: start one with `dask scheduler` "
                                  f"({error})") from None
         else:
-            board = "127.0.0.1:0" if importlib.util.find_spec("bokeh") else None
-            # the memory is the child's, and watched there
-            cluster = stack.enter_context(LocalCluster(
-                n_workers=farm.workers, threads_per_worker=1, processes=True, memory_limit=None,
-                dashboard_address=board, silence_logs=logging.CRITICAL, host="127.0.0.1"))
+            cluster = stack.enter_context(_started(LocalCluster, farm.workers))
             client = Client(cluster)
         stack.enter_context(client)
         yield client
+
+
+def _started(make: Callable[..., Any], workers: int) -> Any:  # noqa: ANN401 - Dask's cluster
+    """Start workers here; one that is killed while it starts has Dask give up on all, so that it is tried again."""
+    board = "127.0.0.1:0" if importlib.util.find_spec("bokeh") else None
+    for _ in range(_LOST):
+        try:
+            # no limit of memory: it is the child's, and watched there
+            return make(n_workers=workers, threads_per_worker=1, processes=True, memory_limit=None,
+                        dashboard_address=board, silence_logs=logging.CRITICAL, host="127.0.0.1")
+        except (RuntimeError, OSError, TimeoutError) as error:
+            last = error
+    raise ValueError(f"Dask's workers do not start: {last}")
 
 
 @contextmanager
