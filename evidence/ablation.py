@@ -87,6 +87,6 @@ def _plot(figures: dict[str, dict[str, float]]) -> Plot:
                   color=color, label=FIGURES[kind])
     axes.axvline(1, color="#1d2733", linewidth=1)
     axes.set_yticks(place, list(figures))
-    axes.set(xlabel="deviation over the default's (geometric mean; right of one is worse)", xscale="log")
-    axes.legend(loc="lower right")
+    axes.set(xlabel="deviation over the default's (geometric mean; right of one is worse)")
+    axes.legend(loc="upper right")
     return Plot("What each choice gives, over the default.", drawing)

@@ -47,8 +47,9 @@ class Context:
         return [self.models[name] for name in names]
 
     def lack(self, names: tuple[str, ...]) -> list[str]:
-        """Return a line for each model that is not at hand."""
-        return [f"{name} ({why})" for name, why in self.missing.items() if name in names and not self.short]
+        """Return a line about the models that are not at hand."""
+        lacking = [name for name in names if name in self.missing]
+        return [f"{', '.join(lacking)}: not at hand (see the top)"] if lacking and not self.short else []
 
     def target(self, model: Model, percent: int) -> int:
         """Return the triangles of a level: the paper's own number where the model is the paper's."""

@@ -92,7 +92,7 @@ def _rows(context: Context, name: str, found: dict) -> list[list]:
             if (name, method) in found:
                 counts = found[name, method][place]
                 share = 100 * sum(counts[:4]) / sum(counts)
-                rows.append([f"{percent} %", method.upper(), *counts, _average(counts), round(share, 2)])
+                rows.append([f"{percent} %", method.upper(), *counts, _average(counts), f"{share:.2f}"])
         if name in MOVES:
             rows.append([f"{percent} %", "*paper*", *(Printed(count) for count in MOVES[name][percent]),
                          Printed(AVERAGE_MOVES[name][percent]), Printed(AT_MOST_THREE[name][percent], ".2f")])

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.font_manager import findfont
 from PIL import Image, ImageDraw, ImageFont
 
 SMALL = 1200  # pixels across, of a strip of pictures in Markdown
@@ -89,7 +90,7 @@ def shown(cell: Cell, form: str = "") -> str:
     if cell is None or (isinstance(cell, float) and not np.isfinite(cell)):
         return "–"
     if isinstance(cell, float):
-        return format(cell, form) if form else f"{cell:,.0f}" if abs(cell) >= 100 else format(cell, "#.3g")
+        return format(cell, form) if form else f"{cell:,.0f}" if abs(cell) >= 100 else format(cell, "#.3g").rstrip(".")
     return f"{cell:,}" if isinstance(cell, int) else cell
 
 
@@ -218,7 +219,7 @@ def strip(pictures: Pictures) -> Image.Image:
     high, line = round(side * ratio), 26
     rows = -(-len(pictures.items) // columns)
     whole = Image.new("RGB", (side * columns, rows * (high + line)), "white")
-    pen, font = ImageDraw.Draw(whole), ImageFont.load_default(15)
+    pen, font = ImageDraw.Draw(whole), ImageFont.truetype(findfont("DejaVu Sans"), 15)
     for number, (picture, label) in enumerate(pictures.items):
         left, top = number % columns * side, number // columns * (high + line)
         tall = round(side * picture.shape[0] / picture.shape[1])

@@ -146,7 +146,7 @@ def _compare(context: Context, part: Section, subject: Subject, coarse: Mesh) ->
     stream = from_bytes(progressive(*subject.mesh, base_faces=1, method="feature", epsilon=-0.2).to_bytes())
     level, whole = stream.at(faces=len(once[1])), stream.restore()
     base = stream.at(faces=0)
-    meshes = [("subdivided three times", subject.mesh), ("reconstructed whole", _mesh(whole)),
+    meshes = [("subdivided", subject.mesh), ("reconstructed whole", _mesh(whole)),
               ("subdivided once", once), ("reconstructed to as many", _mesh(level)),
               ("the simplified mesh", _mesh(base))]
     same = same_faces(subject.mesh, _mesh(whole))
@@ -155,15 +155,15 @@ def _compare(context: Context, part: Section, subject: Subject, coarse: Mesh) ->
     for label, mesh in meshes[1:]:
         distance = float(np.sqrt(squared_distance(subject.mesh[0], mesh))) / diagonal
         part.raw.append({"mesh": label, "faces": len(mesh[1]), "rms": distance})
-        rows.append([label, len(mesh[1]), distance * 1e3])
+        rows.append([label, len(mesh[1]), f"{distance * 1e3:.3f}"])
     part.blocks += [
         f"{subject.title}: {len(subject.mesh[1]):,} triangles, simplified by the feature method at ε −0.2 to "
-        f"{len(base.faces):,}, written as a stream and read back. To the face count of one subdivision it keeps what "
-        "the smooth surface has, where the subdivision of the coarse mesh is only on its way there.",
+        f"{len(base.faces):,}, written as a stream and read back. The paper says that its reconstruction to the face "
+        "count of one subdivision is similar to that subdivision; the table has by how much.",
         Pictures("Figure 12: as subdivided, and as reconstructed.",
                  [(context.picture(mesh, subject.camera), f"{label}: {len(mesh[1]):,}") for label, mesh in meshes],
                  columns=2),
-        Table("Root mean square distance from the vertices of the mesh subdivided three times, in 1e-3 of the diagonal",
+        Table("Root mean square distance from the vertices of the subdivided mesh, in 1e-3 of the diagonal",
               ["mesh", "triangles", "distance"], rows),
         "Reconstructed whole it **equals the original**: every face with the same three positions in single precision."
         if same else "Reconstructed whole it **differs from the original**: this is a fault."]

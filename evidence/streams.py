@@ -34,6 +34,11 @@ class Subject:
     shown: float | None
     sharp: np.ndarray | None = None
 
+    @property
+    def short(self) -> str:
+        """The title without what stands in for what."""
+        return self.title.split(" (")[0]
+
 
 def subjects(context: Context) -> list[Subject]:
     """Return the paper's models at hand, and stand-ins for the bunny and the tiger where they are not."""
@@ -115,7 +120,7 @@ def section(context: Context) -> Section:
                                     columns=3))
     pairs = []
     for subject, mesh in shown:
-        pairs += [(context.picture(subject.mesh, subject.camera), f"{subject.title}: {len(subject.mesh[1]):,}"),
+        pairs += [(context.picture(subject.mesh, subject.camera), f"{subject.short}: {len(subject.mesh[1]):,}"),
                   (context.picture(mesh, subject.camera), f"ε {_name(subject.shown)}: {len(mesh[1]):,}")]
     if pairs:
         part.blocks.append(Pictures("Figure 11: each model, and simplified as the paper does.", pairs, columns=4))
