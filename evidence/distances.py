@@ -171,13 +171,15 @@ def _verdict(found: Found) -> str:
     lines = [
         f"- **The cross-check holds:** over {told['cross_check_cases']} meshes our own `measure` and MeshLab's filter "
         f"differ by at most {100 * told['cross_check_worst']:.1f} % in the mean.",
-        f"- **ESO as printed {'agrees' if 0.7 < _geometric(eso) < 1.4 else 'does not agree'}** where the model is the paper's own: our distances in the paper's direction are "
-        f"{min(eso, default=np.nan):.2f} to {max(eso, default=np.nan):.2f} times the printed ones, in the geometric "
-        f"mean {_geometric(eso):.2f}. Ties decide much at 5 %.",
+        f"- **ESO as printed {'agrees' if 0.7 < _geometric(eso) < 1.4 else 'does not agree'}** where the model is the "
+        f"paper's own: our distances in the paper's direction are {min(eso, default=np.nan):.2f} to "
+        f"{max(eso, default=np.nan):.2f} times the printed ones, in the geometric mean {_geometric(eso):.2f}. Ties "
+        f"decide much at 5 %.",
         f"- **CF {'is better than printed' if _geometric(cf) < 0.9 else 'is as printed'}:** {_geometric(cf):.2f} times "
-        f"the printed figures in the geometric mean. The paper does not say how it implements its rival; Equation 5 here, with the flip test that everyone "
-        f"gets, loses less. So the printed improvement rates flatter: ESO has the lesser symmetric maximum in {below} "
-        f"of {len(told['eso_over_cf_max'])} cases, by a factor of {_geometric(told['eso_over_cf_max']):.2f}.",
+        f"the printed figures in the geometric mean. The paper does not say how it implements its rival; Equation 5 "
+        f"here, with the flip test that everyone gets, loses less. So the printed improvement rates flatter: ESO has "
+        f"the lesser symmetric maximum in {below} of {len(told['eso_over_cf_max'])} cases, by a factor of "
+        f"{_geometric(told['eso_over_cf_max']):.2f}.",
         f"- **Against plain QEM**, which the paper's tables leave out, ESO as printed has "
         f"{_geometric(told['eso_over_qem_max']):.2f} times the symmetric maximum and "
         f"{_geometric(told['eso_over_qem_mean']):.2f} times the mean: the weight trades one for the other.",
