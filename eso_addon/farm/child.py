@@ -40,6 +40,7 @@ class Child:
             [sys.executable, "-m", module], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
             env={**os.environ, **threads, "PYTHONPATH": os.pathsep.join(filter(None, paths))},
             start_new_session=True)  # Ctrl-C is for the one that started the run, who will end this process
+        self.module = module
         self._answers: queue.SimpleQueue[bytes] = queue.SimpleQueue()
         threading.Thread(target=self._listen, daemon=True).start()
         self.peak = 0
@@ -147,6 +148,8 @@ def work_off(module: str, request: Mapping[str, Any], timeout: float, memory: in
     tries = own = 0
     while True:
         child: Child | None = getattr(_mine, "child", None)
+        if child is not None and child.module != module:
+            child.close()
         if child is None or not child.alive:
             child = _mine.child = Child(module)
         answer = child.ask(request, timeout, memory)

@@ -2,6 +2,7 @@
 """pymeshlab's word on a deviation, where it is installed: in a process of its own: it does not go well with bpy."""
 
 import json
+import os
 import subprocess
 import sys
 import tempfile
@@ -17,7 +18,6 @@ _LONGEST_SECONDS = 600
 # Read by the other Python: it gets the path that this one has, and knows nothing of Blender.
 _SCRIPT = """
 import json, sys
-sys.path[:0] = json.loads(sys.argv[2])
 import numpy, pymeshlab
 data = numpy.load(sys.argv[1])
 meshes = pymeshlab.MeshSet()
@@ -53,8 +53,9 @@ def second_opinion_steps(v0: Any, f0: Any, v1: Any, f1: Any, samples: int) -> Ge
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "meshes.npz"
         np.savez(path, v0=v0, f0=f0, v1=v1, f1=f1, samples=samples)
-        command = [sys.executable, "-c", _SCRIPT, str(path), json.dumps(sys.path)]
-        process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+        paths = os.pathsep.join(filter(None, sys.path))
+        process = subprocess.Popen([sys.executable, "-c", _SCRIPT, str(path)], stdout=subprocess.PIPE,
+                                   stderr=subprocess.DEVNULL, text=True, env={**os.environ, "PYTHONPATH": paths})
         try:
             for _ in range(round(_LONGEST_SECONDS / _POLL_SECONDS)):
                 try:
