@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Long arrays in blocks that stay in the processor's cache, on a few threads: numpy releases Python's lock."""
+"""Long arrays in blocks that stay in the processor's cache, on several threads where they pay."""
 
-import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import TypeVar
@@ -15,11 +14,12 @@ class Blocks:
     Parameters
     ----------
     threads : int, optional
-        As many as there are processors, at most four, where it is not given.
+        One where it is not given: the calls are short, and two threads that hand Python's lock to each other were
+        slower (docs/decisions/engine.md).
     """
 
     def __init__(self, threads: int | None = None) -> None:
-        self.threads = threads or min(os.cpu_count() or 1, 4)
+        self.threads = threads or 1
         self._pool = ThreadPoolExecutor(self.threads) if self.threads > 1 else None
 
     def map(self, function: Callable[[slice], Result], count: int, size: int) -> list[Result]:

@@ -72,7 +72,7 @@ class Options:
     symmetry : str
         "x", "y" or "z" for a symmetric result of a mesh that is symmetric across this axis, or "none".
     threads : int, optional
-        All processors, at most four, where not given. The result does not depend on it.
+        One where not given. The result does not depend on it.
     """
 
     method: str = "eso"

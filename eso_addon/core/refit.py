@@ -18,8 +18,8 @@ Bools = NDArray[np.bool_]
 Floats = NDArray[Any]  # float64, or float32 where only a choice hangs on it
 Ints = NDArray[np.int64]
 
-_ROUNDS = 5
-_PER_FACE = 15  # samples wanted for each simplified face,
+_ROUNDS = 3
+_PER_FACE = 10
 _LEAST = 5000  # and at least so many in all: they are soon done, and miss nothing of a small mesh
 _DAMPING = 0.2  # pull towards the present position, relative to what evenly spread samples weigh
 _TILT = 0.03  # weight of a tilt against the original's normal, times an edge, beside that of a distance
