@@ -7,9 +7,11 @@ from pathlib import Path
 
 import bpy
 
-from eso_addon import SimplifyResult, lod_chain, measure
+from eso_addon import SimplifyResult, lod_chain, measure, progressive
 from eso_addon.bridge.quiet import quiet
 from eso_addon.bridge.scene_files import SceneFile
+from eso_addon.core.chains import Chain, Level
+from eso_addon.core.screen import Screen
 from eso_addon.settings.profiles import PROFILES
 
 from .meshes import Mesh, decimate, sample_mesh
@@ -37,13 +39,18 @@ def main() -> int:
 
     original = cow.objects[0].data.copy()
     plain = PROFILES["plain"]
-    written = cow.write_levels(OUT / "cow.blend", [[level] for level in levels], plain.name)
+    screen = Screen()
+    chain = Chain(tuple(Level(level, screen.distance_for_error(level.error)) for level in levels), ())
+    written = cow.write_levels(OUT / "cow.blend", [chain], plain)
+    stream = OUT / "cow.esopm"
+    size = progressive(vertices, faces).save(stream)
+    print(f"The progressive stream: {size} bytes for the exact original")
     made = [bpy.data.objects[plain.name("cow", index)] for index in range(len(levels))]
     pictures = [(f"original: {len(faces)} triangles", original)]
     pictures += [(f"{len(level.faces)} triangles", obj.data) for level, obj in zip(levels, made, strict=True)]
     with quiet("cannot render the contact sheet"):
         contact_sheet(OUT / "contact_sheet.png", pictures)
-    for path in (*written, OUT / "table.md", OUT / "contact_sheet.png"):
+    for path in (*written, stream, OUT / "table.md", OUT / "contact_sheet.png"):
         print(path)
     return 0
 
