@@ -11,6 +11,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from .core.steps import run_to_end
 from .settings.profiles import PROFILES, Profile
 
 if TYPE_CHECKING:
@@ -82,11 +83,11 @@ def make_chains(model: Any, settings: Any) -> list[Chain]:  # noqa: ANN401 - a M
     goals = settings.goals()
     options = [settings.options(carried) for carried in model.carried]
     if goals.kind == "budget":
-        return _run_to_end(chains_steps([part[1:] for part in model.parts], goals, options, model.copies))
+        return run_to_end(chains_steps([part[1:] for part in model.parts], goals, options, model.copies))
     chains = []
     for (name, *mesh), own in zip(model.parts, options, strict=True):
         try:
-            chains += _run_to_end(chains_steps([tuple(mesh)], goals, [own]))
+            chains += run_to_end(chains_steps([tuple(mesh)], goals, [own]))
         except ValueError as error:
             raise ValueError(f"{name}: {error}") from error
     return chains
@@ -130,11 +131,3 @@ def outcome(name: str, level: int, before: int, result: SimplifyResult, distance
 
 def _list_of(read: Read) -> Callable[[str], list[float]]:
     return lambda words: [read(word) for word in words.split(",")]
-
-
-def _run_to_end(steps: Any) -> list[Chain]:  # noqa: ANN401 - a generator
-    while True:
-        try:
-            next(steps)
-        except StopIteration as end:
-            return end.value

@@ -129,16 +129,12 @@ def _read_scene(path: Path, keep_order: bool) -> tuple[Callable[[dict[str, Any]]
     """Read a file through Blender."""
     from .bridge.stream_files import read_stream_objects
     from .bridge.stream_objects import stream_steps
+    from .core.steps import run_to_end
 
     meshes, meta = read_stream_objects(path, keep_order=keep_order)
 
     def make(options: dict[str, Any]) -> Scene:
-        steps = stream_steps(meshes, meta, options)
-        while True:
-            try:
-                next(steps)
-            except StopIteration as end:
-                return end.value
+        return run_to_end(stream_steps(meshes, meta, options))
 
     lost = sorted({name for mesh in meshes for name in mesh.left_behind})
     return make, [f"{path.name}: not carried: {', '.join(lost)}"] if lost else []

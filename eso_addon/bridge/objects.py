@@ -93,17 +93,6 @@ def level_collection(name: str, scene: bpy.types.Scene, *, shown: bool = True) -
     return collection
 
 
-def remove_levels(source: bpy.types.Object, collection: bpy.types.Collection) -> int:
-    """Remove the levels that were made earlier from an object, with their meshes; say how many."""
-    old = [obj for obj in collection.objects if obj.get(SOURCE) == source.name and obj != source]
-    for obj in old:
-        mesh = obj.data
-        bpy.data.objects.remove(obj)
-        if mesh.users == 0:
-            bpy.data.meshes.remove(mesh)
-    return len(old)
-
-
 def why_not_in_place(obj: bpy.types.Object) -> str:
     """Say why an object's mesh cannot be replaced; empty if it can."""
     if obj.library is not None or obj.data.library is not None:

@@ -219,25 +219,6 @@ def world_triangles(path: Path) -> tuple[NDArray[np.float64], NDArray[np.int64]]
     return _joined(SceneFile(path).objects)
 
 
-def write_triangles(path: Path, vertices: NDArray[np.float32], faces: NDArray[np.int32]) -> None:
-    """Write one mesh of triangles to a file, in a scene of its own.
-
-    Parameters
-    ----------
-    path
-        A file whose ending is in `WRITERS`.
-    vertices : (n, 3) float32
-    faces : (m, 3) int32
-    """
-    with quiet(f"cannot write {path.name}"):
-        start_empty()
-        mesh = bpy.data.meshes.new(path.stem)
-        mesh.from_pydata(vertices, (), faces.tolist())
-        obj = bpy.data.objects.new(path.stem, mesh)
-        bpy.context.scene.collection.objects.link(obj)
-        write_scene(path, [obj])
-
-
 def write_stage(path: Path) -> None:
     """Write the scene in the window, and nothing else of the file, as a .blend file."""
     bpy.data.libraries.write(str(path), {bpy.context.scene}, path_remap="ABSOLUTE")

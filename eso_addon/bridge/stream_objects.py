@@ -13,6 +13,7 @@ import numpy as np
 from mathutils import Matrix
 
 from ..core.mesh import MeshError
+from ..core.steps import scaled
 from ..progressive.progressive import Level, progressive_steps
 from ..progressive.scene import Scene, load_scene
 from .read_mesh import evaluated_mesh, stored_mesh
@@ -121,12 +122,8 @@ def stream_steps(meshes: Sequence[StreamMesh], meta: dict[str, Any],
     for mesh in meshes:
         steps = progressive_steps(mesh.vertices, mesh.faces, attributes=mesh.attributes, edges=mesh.edges,
                                   meta=mesh.meta, **options)
-        while True:
-            try:
-                yield (done + next(steps) * len(mesh.faces)) / total
-            except StopIteration as end:
-                made.append(end.value)
-                break
+        begun, count = done, len(mesh.faces)
+        made.append((yield from scaled(steps, lambda part, begun=begun, count=count: (begun + part * count) / total)))
         done += len(mesh.faces) + 1
     return Scene(made, meta)
 

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Bools = NDArray[np.bool_]
+Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
@@ -218,3 +219,28 @@ def vertex_components(faces: Ints, vertex_count: int) -> Ints:
     ones = np.concatenate((faces[:, 0], faces[:, 1]))
     others = np.concatenate((faces[:, 1], faces[:, 2]))
     return components(vertex_count, ones, others)
+
+
+def part_diagonals(vertices: Floats, faces: Ints, part: Ints) -> Floats:
+    """Return the diagonal of the bounding box of each part of a mesh.
+
+    Parameters
+    ----------
+    vertices : (n, 3) float64
+    faces : (m, 3) int64
+    part : (m,) int64, the part of each face, from 0
+
+    Returns
+    -------
+    (p,) float64
+    """
+    count = int(part.max(initial=-1)) + 1
+    square = np.zeros(count)
+    for axis in range(3):
+        values = vertices[:, axis].take(faces)
+        low, high = np.full(count, np.inf), np.full(count, -np.inf)
+        np.minimum.at(low, part, values.min(axis=1))
+        np.maximum.at(high, part, values.max(axis=1))
+        # numbers that no face has stay without size
+        square += np.square(np.maximum(high - low, 0))
+    return np.sqrt(square)

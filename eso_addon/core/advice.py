@@ -5,9 +5,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from .adjacency import vertex_components
+from .adjacency import part_diagonals, vertex_components
 from .levels import SimplifyResult
-from .mesh import Floats, Ints, weld
+from .mesh import weld
 from .options import Options
 
 
@@ -30,7 +30,7 @@ def prune_for(result: SimplifyResult, target: int) -> tuple[float, int] | None:
     vertices, faces = result.original
     part = vertex_components(weld(vertices).take(faces), len(vertices)).take(weld(vertices).take(faces[:, 0]))
     _, part = np.unique(part, return_inverse=True)
-    sizes = _diagonals(vertices, faces, part)
+    sizes = part_diagonals(vertices, faces, part)
     order = np.argsort(sizes, kind="stable")
     kept = np.bincount(part.take(result.face_map), minlength=len(sizes)).take(order)
     left = len(result.faces) - np.cumsum(kept)  # without the parts up to this one
@@ -41,19 +41,6 @@ def prune_for(result: SimplifyResult, target: int) -> tuple[float, int] | None:
         return None
     last = int(possible[0])
     return _short_number_between(float(sizes[last]), float(sizes[last + 1])), last + 1
-
-
-def _diagonals(vertices: Floats, faces: Ints, part: Ints) -> Floats:
-    """Return the diagonal of each part's bounding box."""
-    count = int(part.max(initial=-1)) + 1
-    square = np.zeros(count)
-    for axis in range(3):
-        values = vertices[:, axis].take(faces)
-        low, high = np.full(count, np.inf), np.full(count, -np.inf)
-        np.minimum.at(low, part, values.min(axis=1))
-        np.maximum.at(high, part, values.max(axis=1))
-        square += (high - low) ** 2
-    return np.sqrt(square)
 
 
 def _short_number_between(low: float, high: float) -> float:

@@ -13,8 +13,9 @@ from .budget import share_budget
 from .levels import Mesh, SimplifyResult
 from .mesh import MeshError, check_mesh
 from .options import Options, number, targets_of
-from .recording import Recording, recording_steps, scaled
+from .recording import Recording, recording_steps
 from .screen import Screen, extent_of
+from .steps import scaled
 
 KINDS = ("ratio", "count", "error", "screen", "budget")
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .mesh import morton_order
+from .steps import run_to_end
 
 Bools = NDArray[np.bool_]
 Floats = NDArray[Any]  # float64, or float32 where only a choice hangs on it
@@ -87,11 +88,7 @@ class ClosestPoints:
             (p, 3) float64, (p,) int64 and (p,) float64; NaN, -1 and infinity where nothing lies within `max_distance`.
         """
         steps = self.query_steps(points, max_distance=max_distance, hint=hint)
-        while True:
-            try:
-                next(steps)
-            except StopIteration as end:
-                return end.value
+        return run_to_end(steps)
 
     def query_steps(
         self,

@@ -14,6 +14,7 @@ from .closest import ClosestPoints
 from .mesh import MeshError, check_mesh, weld
 from .normals import face_area_vectors, lengths
 from .sampling import edge_samples, face_samples
+from .steps import run_to_end, scaled
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -92,11 +93,7 @@ def measure(
         A mesh is malformed, not finite, or has no face with an area.
     """
     steps = measure_steps(v0, f0, v1, f1, samples=samples, seed=seed)
-    while True:
-        try:
-            next(steps)
-        except StopIteration as end:
-            return end.value
+    return run_to_end(steps)
 
 
 def measure_steps(
@@ -160,14 +157,8 @@ def _one_way(
     search = ClosestPoints(target.vertices, target.faces)
     answers = []
     for number, queried in enumerate((corners, edges, points)):
-        steps = search.query_steps(queried)
-        while True:
-            try:
-                next(steps)
-            except StopIteration as end:
-                answers.append(end.value)
-                break
-            yield begun + 0.49 * (number + 0.5) / 3
+        part = begun + 0.49 * (number + 0.5) / 3
+        answers.append((yield from scaled(search.query_steps(queried), lambda _, part=part: part)))
     closest, hit, squared = answers[2]
     farthest = max(answer[2].max() for answer in answers[:2])
     cosine = _best_cosine(source.normals.take(face, axis=0), closest, hit, target, tie)

@@ -26,14 +26,9 @@ class LineGuard:
 
     def __init__(self, edges: Ints, count: int, toll: float) -> None:
         self._edges, self._toll = edges, toll
-        self._locked = np.zeros(count + 1, bool)
         self._lined = np.zeros(count + 1, bool)
         self._ends = edges[0]
         self._look()
-
-    def lock(self, vertices: Bools) -> None:
-        """Keep these vertices, (n,) bool, where they are, whatever happens."""
-        self._locked[:-1] |= vertices
 
     def _look(self) -> None:
         """Find out which vertices are on lines, and their neighbours there."""
@@ -46,15 +41,6 @@ class LineGuard:
         self._ends = ends.take(order)
         self._keys = np.sort(np.minimum(*self._edges) * count + np.maximum(*self._edges))
         self._neighbors = self._edges[::-1].ravel().take(order)
-
-    def holds(self, one: Ints, other: Ints) -> tuple[Bools, Bools]:
-        """Tell which end of each edge must stay where it is; where both must, the edge may not go.
-
-        Parameters
-        ----------
-        one, other : ndarray, (e,) int64
-        """
-        return self._locked.take(one), self._locked.take(other)
 
     def tolls(self, one: Ints, other: Ints) -> np.ndarray:
         """Return what the cost of each edge is multiplied by, (e,) float32."""

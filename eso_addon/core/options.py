@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .attributes import Attribute
-from .collapse import Rules
+from .engine_state import Rules
 from .mesh import MeshError
 from .variation import METHODS as WEIGHTS
 
@@ -60,7 +60,7 @@ class Options:
         The edges that attributes on edges belong to, as pairs of input vertices.
     seam_lines, material_lines, sharp_lines, boundary_lines : str
         What becomes of seams of UV and other values, borders of materials, sharp edges and open boundaries: "kept"
-        (simplified along themselves, never across), "locked" (not touched) or "ignored".
+        (simplified along themselves, crossed last), "locked" (not touched) or "ignored".
     line_weight : float
         Weight of the quadrics that hold lines in their place.
     line_toll : float

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .adjacency import vertex_components
+from .adjacency import part_diagonals, vertex_components
 from .manifold import boundary_sides, open_vertices, orient, winding_conflicts
 from .mesh import Bools, Floats, Ints, MeshError, bounds, hashes, morton_order, morton_weld
 
@@ -153,12 +153,4 @@ def _distinct(faces: Ints) -> Ints:
 def _large_parts(vertices: Floats, faces: Ints, least: float) -> Bools:
     """Tell the faces of connected parts whose bounding box has a diagonal of at least so much."""
     part = vertex_components(faces, len(vertices)).take(faces[:, 0])
-    count = int(part.max()) + 1
-    square = np.zeros(count)
-    for axis in range(3):
-        values = vertices[:, axis].take(faces)
-        low, high = np.full(count, np.inf), np.full(count, -np.inf)
-        np.minimum.at(low, part, values.min(axis=1))
-        np.maximum.at(high, part, values.max(axis=1))
-        square += (high - low) ** 2
-    return (square >= least * least).take(part)
+    return (part_diagonals(vertices, faces, part) >= least).take(part)

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from .blocks import Blocks
 from .carrier import Carrier
@@ -17,6 +17,7 @@ from .levels import Mesh, SimplifyResult, in_input_units, judge_count, level
 from .options import Options
 from .prepare import Prepared, prepare
 from .record import CollapseRecord
+from .steps import scaled
 from .symmetry import mirror_of
 from .weigh import initial_quadrics
 
@@ -112,12 +113,3 @@ def recording_steps(original: Mesh, options: Options, least: int) -> Generator[f
         record = replace(record, faces_before=2 * record.faces_before + rest,
                          faces_left=2 * record.faces_left + rest)
     return Recording(mesh, record, original, options, least, guidance.carrier)
-
-
-def scaled(steps: Generator[Any, None, Value], scale: Any) -> Generator[float, None, Value]:  # noqa: ANN401
-    """Yield a function of what the steps yield; returns their result."""
-    while True:
-        try:
-            yield scale(next(steps))
-        except StopIteration as end:
-            return end.value

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from .adjacency import boundary_vertices, sorting_order, stars
 from .closest import ClosestPoints, closest_in_triangles, squared_distances, triangle_frames
 from .flips import flip_edges
+from .mesh import bounds
 from .normals import face_area_vectors, face_areas, face_normals, lengths
 
 Bools = NDArray[np.bool_]
@@ -76,15 +77,27 @@ def refit(
     corner : (m, 3) int64
         For each corner of the new faces the corner of the given ones that it was, as 3 * face + number.
     """
-    corner = np.arange(faces.size).reshape(faces.shape)
     held = boundary_vertices(faces, len(vertices))
     if fixed is not None:
         held |= fixed
     flat = not face_area_vectors(original_vertices, original_faces).any()
     if len(faces) == 0 or rounds < 1 or flat or (held.all() and not flips):
-        return vertices.copy(), corner
+        return vertices.copy(), np.arange(faces.size).reshape(faces.shape)
+    fit, center, size = _begun(vertices, faces, original_vertices, original_faces, vertex_map, held)
+    start = fit.vertices
+    for done in range(rounds):
+        fit.move()
+        if flips and done < rounds - 1:
+            fit.flip(bound, group)
+    moved = fit.vertices
+    return np.where((moved == start).all(axis=1)[:, None], vertices, moved * size + center), fit.corner
+
+
+def _begun(vertices: Floats, faces: Ints, original_vertices: Floats, original_faces: Ints, vertex_map: Ints | None,
+           held: Bools) -> tuple[_Fit, Floats, float]:
+    """Return what is fitted, in a frame of its own: about this centre, and of this size."""
     # unit size and the origin in the middle keep the precision of small parts of large scenes
-    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    low, high = bounds(vertices)
     center, size = (low + high) / 2, float((high - low).max()) or 1.0
     samples, weights, near, normals = _samples(original_vertices, original_faces, max(_PER_FACE * len(faces), _LEAST))
     # single precision decides which face is near: it takes half the time, and positions are solved in double
@@ -92,13 +105,7 @@ def refit(
     points = exact.astype(np.float32)
     start = (vertices - center) / size
     face = _first_faces(start, faces, points, None if vertex_map is None else vertex_map.take(near))
-    fit = _Fit(start, faces, corner, _Samples(exact, points, weights, normals), face, held)
-    for done in range(rounds):
-        fit.move()
-        if flips and done < rounds - 1:
-            fit.flip(bound, group)
-    moved = fit.vertices
-    return np.where((moved == start).all(axis=1)[:, None], vertices, moved * size + center), fit.corner
+    return _Fit(start, faces, _Samples(exact, points, weights, normals), face, held), center, size
 
 
 class _Samples(NamedTuple):
@@ -142,8 +149,9 @@ def _evenly(count: int, share: float) -> Ints:
 class _Fit:
     """A simplified mesh on its way to its samples, each with its nearest face."""
 
-    def __init__(self, vertices: Floats, faces: Ints, corner: Ints, samples: _Samples, face: Ints, held: Bools) -> None:
-        self.vertices, self.faces, self.corner = vertices, faces, corner
+    def __init__(self, vertices: Floats, faces: Ints, samples: _Samples, face: Ints, held: Bools) -> None:
+        self.vertices, self.faces = vertices, faces
+        self.corner = np.arange(faces.size).reshape(faces.shape)
         self.samples, self.face, self.held = samples, face, held
         self.start = vertices  # since the last flips: what faces turn against
         self.neighbors = _face_neighbors(faces, len(vertices))

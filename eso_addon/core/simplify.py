@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike
 from .levels import SimplifyResult
 from .mesh import check_mesh
 from .options import options_of, targets_of
-from .recording import recording_steps, scaled
+from .recording import recording_steps
+from .steps import run_to_end, scaled
 
 Value = TypeVar("Value")
 
@@ -49,7 +50,7 @@ def simplify(vertices: ArrayLike, faces: ArrayLike, *, ratio: float | None = Non
     >>> import eso_addon
     >>> result = eso_addon.simplify(vertices, faces, ratio=0.1)
     """
-    return _finish(simplify_steps(vertices, faces, ratio=ratio, faces_target=faces_target, max_error=max_error,
+    return run_to_end(simplify_steps(vertices, faces, ratio=ratio, faces_target=faces_target, max_error=max_error,
                                   preset=preset, **options))
 
 
@@ -81,7 +82,7 @@ def lod_chain(vertices: ArrayLike, faces: ArrayLike, ratios: Sequence[float] | N
     list of SimplifyResult
         In the order of the targets. Levels are nested: before a refit, each is made of vertices of the finer ones.
     """
-    return _finish(lod_chain_steps(vertices, faces, ratios, faces_targets=faces_targets, max_errors=max_errors,
+    return run_to_end(lod_chain_steps(vertices, faces, ratios, faces_targets=faces_targets, max_errors=max_errors,
                                    preset=preset, **options))
 
 
@@ -97,12 +98,3 @@ def lod_chain_steps(vertices: ArrayLike, faces: ArrayLike, ratios: Sequence[floa
     least = min(counts) if counts else 0
     recording = yield from scaled(recording_steps(original, chosen, least), lambda part: 0.8 * part)
     return (yield from scaled(recording.levels_steps(counts, errors), lambda part: 0.8 + 0.2 * part))
-
-
-def _finish(steps: Generator[Any, None, Value]) -> Value:
-    """Run a generator to its end and return its result."""
-    while True:
-        try:
-            next(steps)
-        except StopIteration as end:
-            return end.value

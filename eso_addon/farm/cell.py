@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -18,6 +17,7 @@ from ..core.options import Options, options_of
 from ..core.prepare import Prepared, prepare
 from ..core.record import CollapseRecord
 from ..core.refit import refit
+from ..core.steps import run_to_end
 from ..core.variation import surface_variation
 from ..core.weigh import initial_quadrics
 
@@ -68,7 +68,7 @@ def run_cell(folder: str, cell: int, dtype: str, least: int, scale: float, threa
     try:
         quadrics = _quadrics(mesh, chosen, scale, blocks)
         run = collapse_steps(mesh.points, mesh.faces, quadrics, mesh.opened, locked, least, chosen.rules, blocks)
-        record = _end_of(run)
+        record = run_to_end(run)
     finally:
         blocks.close()
     position = record.position * mesh.size + mesh.center
@@ -152,14 +152,6 @@ def _quadrics(mesh: Prepared, options: Options, scale: float, blocks: Blocks) ->
         weights = surface_variation(mesh.points.T, mesh.faces.T, rings, blocks) * (scale / mesh.size)
         quadrics *= (np.maximum(weights, 1e-6) ** options.weight_power)[:, None]
     return quadrics
-
-
-def _end_of(steps: Generator[int, None, CollapseRecord]) -> CollapseRecord:
-    while True:
-        try:
-            next(steps)
-        except StopIteration as end:
-            return end.value
 
 
 if __name__ == "__main__":

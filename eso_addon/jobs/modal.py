@@ -7,7 +7,8 @@ from typing import Any
 import bpy
 
 from ..core.mesh import MeshError
-from .worker import GRACE_SECONDS, Steps, Worker, run_to_end
+from ..core.steps import run_to_end
+from .worker import GRACE_SECONDS, Steps, Worker
 
 _POLL_SECONDS = 0.01
 # Each picture of the bar costs a redraw, which window and engine wait for.

@@ -9,7 +9,8 @@ from typing import Any
 from ..core.levels import SimplifyResult
 from ..core.mesh import check_mesh
 from ..core.options import options_of, targets_of
-from ..core.recording import Recording, recording_steps, scaled
+from ..core.recording import Recording, recording_steps
+from ..core.steps import scaled
 
 _kept: dict[str, Recording] = {}
 

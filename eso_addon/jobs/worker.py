@@ -15,15 +15,6 @@ GRACE_SECONDS = 3.0
 _running: "WeakSet[Worker]" = WeakSet()
 
 
-def run_to_end(steps: Steps[Result]) -> Result:
-    """Run the steps in this thread and give their result."""
-    while True:
-        try:
-            next(steps)
-        except StopIteration as end:
-            return end.value
-
-
 class Worker(Generic[Result]):
     """Runs steps in a thread; they may touch arrays only, never Blender's data."""
 

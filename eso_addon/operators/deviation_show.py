@@ -74,6 +74,7 @@ def _distances(original: "MeshArrays", simplified: "MeshArrays") -> "Generator[f
 
     from ..core.closest import ClosestPoints
     from ..core.mesh import MeshError
+    from ..core.steps import scaled
 
     yield 0.0
     if not len(original.triangles):
@@ -83,13 +84,8 @@ def _distances(original: "MeshArrays", simplified: "MeshArrays") -> "Generator[f
     points, faces = divided(simplified.vertices, simplified.triangles, sides)
     search = ClosestPoints(original.vertices, original.triangles)
     yield 0.3
-    steps = search.query_steps(points)
-    while True:
-        try:
-            next(steps)
-        except StopIteration as end:
-            return points, faces, np.sqrt(end.value[2])
-        yield 0.6
+    _, _, squared = yield from scaled(search.query_steps(points), lambda _: 0.6)
+    return points, faces, np.sqrt(squared)
 
 
 def divided(

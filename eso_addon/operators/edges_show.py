@@ -5,13 +5,12 @@
 
 from collections.abc import Generator
 from math import degrees, radians
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import bpy
-from bpy.props import BoolProperty, FloatProperty
+from bpy.props import FloatProperty
 
-from ..jobs.modal import EngineOperator
-from .polls import poll_with, why_not_simplify
+from .active_mesh import ActiveMeshOperator
 from .reports import tell
 
 if TYPE_CHECKING:
@@ -25,7 +24,7 @@ if TYPE_CHECKING:
 _SHARP, _BASE = (1.0, 0.35, 0.1, 1.0), (0.2, 0.75, 1.0, 1.0)
 
 
-class OBJECT_OT_eso_edges_show(EngineOperator, bpy.types.Operator):
+class OBJECT_OT_eso_edges_show(ActiveMeshOperator, bpy.types.Operator):
     """Draw the edges that the method Feature keeps: sharp edges, and base edges below epsilon"""
 
     bl_idname = "object.eso_edges_show"
@@ -47,24 +46,10 @@ class OBJECT_OT_eso_edges_show(EngineOperator, bpy.types.Operator):
         min=-1.0,
         max=1.0,
     )
-    apply_modifiers: BoolProperty(
-        name="Apply Modifiers", description="Look at the mesh as modifiers and shape keys show it", default=True
-    )
-
-    _object: bpy.types.Object
-    _source: Any  # MeshArrays
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Need an active mesh object."""
-        return poll_with(cls, why_not_simplify(context))
 
     def prepare(self, context: bpy.types.Context) -> "Generator[float, None, Edges]":
         """Read the active mesh."""
-        from ..bridge.read_mesh import read_mesh
-
-        self._object = context.active_object
-        self._source = read_mesh(self._object, apply_modifiers=self.apply_modifiers)
+        self.read(context)
         return _find(self._source, degrees(self.sharp_angle), self.epsilon)
 
     def finish(self, context: bpy.types.Context, result: "Edges") -> None:

@@ -12,7 +12,9 @@ from bpy_extras.io_utils import ExportHelper
 
 from ..bridge.stream_objects import mesh_objects, read_objects, stream_steps
 from ..core.mesh import MeshError
+from ..core.steps import run_to_end, scaled
 from ..progressive.errors import StreamError
+from ..viewer.page import write_page
 from .polls import poll_with
 from .reports import tell
 
@@ -37,6 +39,8 @@ class EXPORT_MESH_OT_esopm(bpy.types.Operator, ExportHelper):
         default=14, min=4, max=24, soft_min=10, soft_max=20)
     keep_order: BoolProperty(
         name="Keep Order", description="Vertices and faces come back in the same order; takes a third more")
+    web_page: BoolProperty(
+        name="Web Page", description="Also write one HTML file that shows the meshes and holds them")
     method: EnumProperty(
         name="Method", description="Which edges are collapsed first", default="qem",
         items=(("qem", "Quadrics", "Plain quadrics: best levels where vertices stay in their place"),
@@ -57,7 +61,8 @@ class EXPORT_MESH_OT_esopm(bpy.types.Operator, ExportHelper):
         """Draw the options beside the file list."""
         layout = self.layout
         layout.use_property_split, layout.use_property_decorate = True, False
-        for name in ("use_selection", "apply_modifiers", "keep_order", "method", "base_percent", "quantise"):
+        for name in ("use_selection", "apply_modifiers", "keep_order", "web_page", "method", "base_percent",
+                     "quantise"):
             layout.prop(self, name)
         row = layout.column()
         row.active = self.quantise
@@ -72,13 +77,10 @@ class EXPORT_MESH_OT_esopm(bpy.types.Operator, ExportHelper):
         try:
             meshes, meta = read_objects(chosen, apply_modifiers=self.apply_modifiers, keep_order=self.keep_order)
             steps = stream_steps(meshes, meta, {"method": self.method, "ratio": self.base_percent / 100})
-            while True:
-                try:
-                    manager.progress_update(next(steps))
-                except StopIteration as end:
-                    scene = end.value
-                    break
+            scene = run_to_end(scaled(steps, manager.progress_update))
             size = scene.save(self.filepath, bits=self.bits if self.quantise else None, keep_order=self.keep_order)
+            if self.web_page:
+                write_page(self.filepath, Path(self.filepath).with_suffix(".html"))
         except (MeshError, StreamError, OSError) as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}

@@ -13,7 +13,7 @@ from ..bridge.lod_sources import LodSource, engine_inputs, read_sources, told_of
 from ..bridge.place_levels import put_mesh
 from ..core.chains import Chain, chains_steps
 from ..core.mesh import MeshError
-from ..core.recording import scaled
+from ..core.steps import scaled
 from ..jobs.modal import EngineOperator
 from ..jobs.worker import Steps
 from ..settings.lod_record import LodSettings

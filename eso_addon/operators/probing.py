@@ -2,24 +2,14 @@
 """Has the engine's results probe their errors in a thread, not in the window's: before the end, or after a replay."""
 
 from collections.abc import Callable, Generator
-from typing import TypeVar
 
 import bpy
 
 from ..core.levels import SimplifyResult
 from ..jobs.worker import Worker
 
-Results = TypeVar("Results", SimplifyResult, list[SimplifyResult])
-
 _POLL_SECONDS = 0.1
 _asked: list[Worker[None]] = []
-
-
-def with_errors(steps: Generator[float, None, Results]) -> Generator[float, None, Results]:
-    """Run the steps, then let each result find its error, which it does when it is first asked."""
-    results = yield from steps
-    yield from _probe([results] if isinstance(results, SimplifyResult) else results)
-    return results
 
 
 def with_errors_if_run(

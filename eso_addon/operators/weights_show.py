@@ -4,13 +4,12 @@
 """The operator that shows the weights of the active mesh's vertices as colours (Figure 11 of the paper)."""
 
 from collections.abc import Generator
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty, IntProperty
+from bpy.props import EnumProperty, IntProperty
 
-from ..jobs.modal import EngineOperator
-from .polls import poll_with, why_not_simplify
+from .active_mesh import ActiveMeshOperator
 from .reports import tell
 
 if TYPE_CHECKING:
@@ -26,7 +25,7 @@ _METHODS = (
 )
 
 
-class OBJECT_OT_eso_weights_show(EngineOperator, bpy.types.Operator):
+class OBJECT_OT_eso_weights_show(ActiveMeshOperator, bpy.types.Operator):
     """Show what guides the simplifier: high weights keep their triangles. Kept in the vertex attribute eso_weight"""
 
     bl_idname = "object.eso_weights_show"
@@ -42,24 +41,10 @@ class OBJECT_OT_eso_weights_show(EngineOperator, bpy.types.Operator):
         max=16,
         soft_max=8,
     )
-    apply_modifiers: BoolProperty(
-        name="Apply Modifiers", description="Weigh the mesh as modifiers and shape keys show it", default=True
-    )
-
-    _object: bpy.types.Object
-    _source: Any  # MeshArrays
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Need an active mesh object."""
-        return poll_with(cls, why_not_simplify(context))
 
     def prepare(self, context: bpy.types.Context) -> "Generator[float, None, NDArray[np.float64]]":
         """Read the active mesh."""
-        from ..bridge.read_mesh import read_mesh
-
-        self._object = context.active_object
-        self._source = read_mesh(self._object, apply_modifiers=self.apply_modifiers)
+        self.read(context)
         return _weigh(self._source, self.method, self.rings)
 
     def finish(self, context: bpy.types.Context, result: "NDArray[np.float64]") -> None:

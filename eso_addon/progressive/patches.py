@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..core.mesh import Floats, Ints, morton_order
+from ..core.steps import scaled
 from .batch_codec import Splits
 from .engine import endpoint_options, lines_of, prepared, run_engine, tangled
 from .estimate import estimated_errors
@@ -115,12 +116,7 @@ def make_patches(source: Source, target: int, options: dict[str, Any]) -> Genera
         own = tangled(mesh.faces, mesh.points.shape[1]) | (locked | unwinding.held).take(mesh.source)
         lines = jumps.lines(points, unwinding)
         run = run_engine(mesh, own, lines, chosen, target)
-        while True:
-            try:
-                yield min(max((len(source.faces) - next(run)) / total, 0.0), 1.0)
-            except StopIteration as end:
-                record = end.value
-                break
+        record = yield from scaled(run, lambda left: min(max((len(source.faces) - left) / total, 0.0), 1.0))
         removed, kept = mesh.source.take(record.removed), mesh.source.take(record.kept)
         costs[removed] = record.cost
         vertices = int(np.count_nonzero(np.bincount(unwinding.faces.ravel())))

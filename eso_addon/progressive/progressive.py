@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..core.mesh import Ints, MeshError
+from ..core.steps import run_to_end
 from ..files.atomic import atomic_output
 from .errors import StreamError
 from .finest import finest, side_rows
@@ -302,11 +303,7 @@ def progressive(vertices: ArrayLike, faces: ArrayLike, *,
     """
     steps = progressive_steps(vertices, faces, attributes=attributes, edges=edges, base_faces=base_faces, ratio=ratio,
                               meta=meta, **options)
-    while True:
-        try:
-            next(steps)
-        except StopIteration as end:
-            return end.value
+    return run_to_end(steps)
 
 
 def progressive_steps(vertices: ArrayLike, faces: ArrayLike, *,

@@ -4,13 +4,14 @@
 """The options of a chain of levels as Blender properties, once, for the panel and for the operators."""
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
+from bpy.props import BoolProperty, EnumProperty, StringProperty
 
 from ..core.mesh import MeshError
 from .keep_options import KeepOptions
 from .lod_record import LodSettings, ordered_goals
 from .options import EngineOptions
 from .profiles import PROFILES
+from .screen_options import ScreenOptions
 
 _SCOPES = (
     ("SELECTED", "Selected", "Levels of every selected mesh, and of the meshes that selected empties instance"),
@@ -28,7 +29,7 @@ _LIST_OF = {"ratio": "ratios", "count": "faces_targets", "error": "max_errors", 
 _PROFILES = tuple((name, profile.label, f"Names and layout for {profile.label}") for name, profile in PROFILES.items())
 
 
-class LodOptions(EngineOptions, KeepOptions):
+class LodOptions(EngineOptions, KeepOptions, ScreenOptions):
     """A chain of levels."""
 
     levels_by: EnumProperty(name="Levels By", items=_LEVELS_BY, default="ratio")
@@ -54,16 +55,6 @@ class LodOptions(EngineOptions, KeepOptions):
         name="Triangles in All",
         description="Triangles of all meshes together at each level, such as 100000, 25000",
         default="100000, 25000",
-    )
-    pixel_error: FloatProperty(
-        name="Pixels", description="Largest error that may be seen, in pixels", default=1.0, min=0.01, soft_max=10.0
-    )
-    resolution: IntProperty(
-        name="Resolution", description="Pixels along the wider side of the picture", default=1920, min=1, max=100_000
-    )
-    lens: FloatProperty(
-        name="Lens", description="Focal length in millimetres, on a sensor 36 mm wide", default=50.0, min=1.0,
-        soft_max=250.0,
     )
     profile: EnumProperty(name="Profile", items=_PROFILES, default="plain")
     scope: EnumProperty(name="Of", items=_SCOPES, default="SELECTED")
@@ -93,8 +84,7 @@ class LodOptions(EngineOptions, KeepOptions):
         if as_text:
             layout.prop(self, _LIST_OF[self.levels_by])
         if self.levels_by == "screen":
-            for name in ("pixel_error", "resolution", "lens"):
-                layout.prop(self, name)
+            self.draw_screen(layout)
         layout.prop(self, "profile")
         if as_text:
             self.draw_places(layout)
@@ -133,7 +123,7 @@ class LodOptions(EngineOptions, KeepOptions):
         return LodSettings(
             kind=kind,
             values=goals,
-            screen={"resolution": self.resolution, "lens": self.lens, "pixels": self.pixel_error},
+            screen=self.screen_settings(),
             engine=self.engine_options(),
             apply_modifiers=self.apply_modifiers,
             live=[name for name, is_live in live.items() if is_live],

@@ -11,6 +11,7 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
 from ..core.screen import Screen
 from .keep_options import KeepOptions
 from .preferences import preferences
+from .screen_options import ScreenOptions
 
 _TARGETS = (
     ("ratio", "Ratio", "Keep this share of the triangles"),
@@ -19,7 +20,7 @@ _TARGETS = (
     ("screen", "Screen", "Keep as few triangles as look the same at a size on screen"),
 )
 _LINES = (
-    ("kept", "Kept", "Simplified along themselves, never across"),
+    ("kept", "Kept", "Simplified along themselves, crossed last"),
     ("locked", "Locked", "Not touched"),
     ("ignored", "Ignored", "Simplified like everything else"),
 )
@@ -129,7 +130,7 @@ class EngineOptions:
 _TARGET_NAMES = {"ratio": "ratio", "count": "faces_target", "error": "max_error", "screen": "max_error"}
 
 
-class SimplifyOptions(EngineOptions, KeepOptions):
+class SimplifyOptions(EngineOptions, KeepOptions, ScreenOptions):
     """One simplified version."""
 
     target: EnumProperty(name="Target", items=_TARGETS, default="ratio")
@@ -154,16 +155,6 @@ class SimplifyOptions(EngineOptions, KeepOptions):
     screen_size: FloatProperty(
         name="Size", description="Pixels of the longest side on screen", default=400.0, min=1.0, soft_max=4000.0
     )
-    pixel_error: FloatProperty(
-        name="Pixels", description="Largest error that may be seen, in pixels", default=1.0, min=0.01, soft_max=10.0
-    )
-    resolution: IntProperty(
-        name="Resolution", description="Pixels along the wider side of the picture", default=1920, min=1, max=100_000
-    )
-    lens: FloatProperty(
-        name="Lens", description="Focal length in millimetres, on a sensor 36 mm wide", default=50.0, min=1.0,
-        soft_max=250.0
-    )
     only_selected: BoolProperty(
         name="Only Selected", description="In Edit Mode, simplify the selected faces and leave the others",
         default=True
@@ -178,13 +169,15 @@ class SimplifyOptions(EngineOptions, KeepOptions):
     def draw_target(self, layout: bpy.types.UILayout) -> None:
         """Draw the target's kind and its value."""
         layout.row(align=True).prop(self, "target", expand=True)
-        names = ("screen_size", "pixel_error", "resolution", "lens")
-        for name in names if self.target == "screen" else (_TARGET_NAMES[self.target],):
-            layout.prop(self, name)
+        if self.target == "screen":
+            layout.prop(self, "screen_size")
+            self.draw_screen(layout)
+        else:
+            layout.prop(self, _TARGET_NAMES[self.target])
 
     def screen(self) -> Screen:
         """Give the picture in which an error is judged."""
-        return Screen(resolution=self.resolution, lens=self.lens, pixels=self.pixel_error)
+        return Screen(**self.screen_settings())
 
     def simplify_target(self) -> dict[str, Any]:
         """Give the target as `simplify` takes it."""

@@ -426,10 +426,6 @@ TEXTS: dict[str, tuple[str, str, str, str]] = {
         "近傍の数リング内の面の変化", "多环邻域内的曲面变化"),
     "Surface variation within one ring": ("Flächenänderung in einem Ring", "Variación de la superficie en un anillo",
                                           "1 リング内の面の変化", "单环内的曲面变化"),
-    "Weigh the mesh as modifiers and shape keys show it": (
-        "Gewichtet das Netz, wie Modifikatoren und Formschlüssel es zeigen",
-        "Pondera la malla como la muestran modificadores y formas", "モディファイアーとシェイプキーを反映して重みを求めます",
-        "按修改器和形态键显示的网格计算权重"),
     "Look at the mesh as modifiers and shape keys show it": (
         "Betrachtet das Netz, wie Modifikatoren und Formschlüssel es zeigen",
         "Examina la malla como la muestran modificadores y formas", "モディファイアーとシェイプキーを反映して調べます",
@@ -472,6 +468,11 @@ TEXTS: dict[str, tuple[str, str, str, str]] = {
         "Punkte und Flächen kommen in derselben Reihenfolge zurück; kostet ein Drittel mehr",
         "Vértices y caras vuelven en el mismo orden; ocupa un tercio más",
         "頂点と面が同じ順序で戻ります。3 分の 1 大きくなります", "顶点和面按相同顺序恢复；体积增加三分之一"),
+    "Web Page": ("Webseite", "Página web", "Web ページ", "网页"),
+    "Also write one HTML file that shows the meshes and holds them": (
+        "Schreibt auch eine HTML-Datei, die die Netze zeigt und enthält",
+        "Escribe también un archivo HTML que muestra las mallas y las contiene",
+        "メッシュを含み表示する HTML ファイルも書き出します", "同时写出一个包含并显示网格的 HTML 文件"),
     "Selected Only": ("Nur Auswahl", "Solo selección", "選択のみ", "仅所选"),
     "Write selected objects only, not all that are visible": (
         "Schreibt nur ausgewählte Objekte, nicht alle sichtbaren",
@@ -554,9 +555,9 @@ TEXTS: dict[str, tuple[str, str, str, str]] = {
     "Kept": ("Behalten", "Conservar", "保持", "保留"),
     "Locked": ("Gesperrt", "Bloquear", "ロック", "锁定"),
     "Ignored": ("Egal", "Ignorar", "無視", "忽略"),
-    "Simplified along themselves, never across": (
-        "In sich vereinfacht, nie quer", "Se simplifican a lo largo, nunca a través", "線に沿って簡略化し、またぎません",
-        "沿自身简化，绝不跨越"),
+    "Simplified along themselves, crossed last": (
+        "In sich vereinfacht, quer nur zuletzt", "Se simplifican a lo largo; a través, lo último",
+        "線に沿って簡略化し、またぐのは最後です", "沿自身简化，最后才跨越"),
     "Not touched": ("Unberührt", "No se tocan", "変更しません", "不改动"),
     "Simplified like everything else": ("Wie alles andere vereinfacht", "Se simplifican como lo demás",
                                         "ほかと同じく簡略化します", "与其他部分一样简化"),

@@ -104,19 +104,6 @@ def test_a_collection_of_levels_is_found_again() -> None:
     assert first.name in scene.collection.children
 
 
-def test_only_levels_of_the_same_source_are_removed() -> None:
-    obj, other = add_cube(), add_cube("Other")
-    collection = objects.level_collection("Levels", bpy.context.scene)
-    for source in (obj, other):
-        properties = objects.result_properties(source, 12, 1, 0.0)
-        objects.add_object(source, new_mesh(), "Level", [collection], modifiers_applied=True, properties=properties)
-    collection.objects.link(obj)
-    assert objects.remove_levels(obj, collection) == 1
-    assert {o[objects.SOURCE] for o in collection.objects if objects.SOURCE in o} == {"Other"}
-    assert obj.name in collection.objects
-    assert len(bpy.data.meshes) == 3
-
-
 def test_a_linked_collection_takes_no_new_objects(tmp_path: Path) -> None:
     collection = objects.level_collection("Far", bpy.context.scene)
     collection.objects.link(add_cube())

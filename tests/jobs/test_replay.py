@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from eso_addon import lod_chain
 from eso_addon.core.levels import SimplifyResult
+from eso_addon.core.steps import run_to_end
 from eso_addon.jobs import replay
-from eso_addon.jobs.worker import run_to_end
 
 
 @pytest.fixture(autouse=True)

@@ -2,8 +2,8 @@
 import numpy as np
 import pytest
 
+from eso_addon.core.steps import run_to_end
 from eso_addon.jobs import second_opinion
-from eso_addon.jobs.worker import run_to_end
 
 FACES = np.array([[0, 1, 2], [1, 3, 2]])
 FLAT = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]], float)

@@ -5,7 +5,8 @@ from collections.abc import Generator
 import pytest
 
 from eso_addon.core.mesh import MeshError
-from eso_addon.jobs.worker import Worker, run_to_end, stop_all
+from eso_addon.core.steps import run_to_end
+from eso_addon.jobs.worker import Worker, stop_all
 
 
 def counting(count: int) -> Generator[float, None, str]:

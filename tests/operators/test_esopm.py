@@ -214,3 +214,10 @@ def test_nothing_selected_is_told(tmp_path: Path) -> None:
     with pytest.raises(RuntimeError, match="no mesh object"):
         bpy.ops.export_mesh.esopm(filepath=str(tmp_path / "n.esopm"), use_selection=True)
     assert not (tmp_path / "n.esopm").exists()
+
+
+def test_a_web_page_comes_with_the_stream(tmp_path: Path) -> None:
+    activate(add_cube())
+    assert bpy.ops.export_mesh.esopm(filepath=str(tmp_path / "cube.esopm"), web_page=True) == {"FINISHED"}
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["cube.esopm", "cube.html"]
+    assert (tmp_path / "cube.html").read_text(encoding="utf-8").startswith("<!doctype html>")
