@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""ESO LOD: meshes with fewer triangles that keep their shape, weighted by extended second-order surface variation.
+"""ESO LOD: meshes with fewer triangles that keep their shape, weighted by the extended shape operator.
 
 The functions of the Python API are loaded when they are first used, so that importing the package needs neither
 numpy nor Blender; `register` and `unregister` are for Blender alone.

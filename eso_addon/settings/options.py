@@ -31,8 +31,8 @@ _SYMMETRIES = (
     ("z", "Z", "A mesh that is symmetric over Z stays so"),
 )
 _METHODS = (
-    ("eso", "ESO", "Extended second-order weights: features by the surface variation within several rings"),
-    ("so", "SO", "Second-order weights: surface variation within one ring"),
+    ("eso", "ESO", "Extended shape operator: features by the surface variation within several rings"),
+    ("so", "SO", "Shape operator: surface variation within one ring"),
     ("cf", "Curvature Factor", "Edges weighted by the curvature at both ends"),
     ("qem", "QEM", "Plain quadric error metric of Garland and Heckbert"),
 )

@@ -183,14 +183,14 @@ TEXTS: dict[str, tuple[str, str, str, str]] = {
         "Gleichungen 8 und 9 wie gedruckt, zum Vergleich", "Ecuaciones 8 y 9 tal como se publicaron, para comparar",
         "式 8 と 9 を論文どおりに使います（比較用）", "按论文公式 8 和 9，用于比较"),
     "Method": ("Verfahren", "Método", "手法", "方法"),
-    "Extended second-order weights: features by the surface variation within several rings": (
-        "Erweiterte Gewichte zweiter Ordnung: Merkmale nach der Flächenänderung in mehreren Ringen",
-        "Pesos extendidos de segundo orden: rasgos según la variación de la superficie en varios anillos",
-        "拡張二次ウェイト：数リング内の面の変化で特徴を捉えます", "扩展二阶权重：根据多环内的曲面变化识别特征"),
-    "Second-order weights: surface variation within one ring": (
-        "Gewichte zweiter Ordnung: Flächenänderung in einem Ring",
-        "Pesos de segundo orden: variación de la superficie en un anillo", "二次ウェイト：1 リング内の面の変化",
-        "二阶权重：单环内的曲面变化"),
+    "Extended shape operator: features by the surface variation within several rings": (
+        "Erweiterter Formoperator: Merkmale nach der Flächenänderung in mehreren Ringen",
+        "Operador de forma extendido: rasgos según la variación de la superficie en varios anillos",
+        "拡張形状作用素：数リング内の面の変化で特徴を捉えます", "扩展形状算子：根据多环内的曲面变化识别特征"),
+    "Shape operator: surface variation within one ring": (
+        "Formoperator: Flächenänderung in einem Ring",
+        "Operador de forma: variación de la superficie en un anillo", "形状作用素：1 リング内の面の変化",
+        "形状算子：单环内的曲面变化"),
     "Curvature Factor": ("Krümmungsfaktor", "Factor de curvatura", "曲率係数", "曲率因子"),
     "Edges weighted by the curvature at both ends": (
         "Kanten, gewichtet nach der Krümmung an beiden Enden", "Aristas con el peso de la curvatura en ambos extremos",
