@@ -25,7 +25,7 @@ demo: $(READY)
 	$(PY) -m demo
 
 test: $(READY)
-	$(PY) -m pytest
+	$(PY) -m pytest -n 2 --dist loadfile
 
 lint: $(READY)
 	$(PY) -m ruff check .
