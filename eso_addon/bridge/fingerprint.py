@@ -4,9 +4,6 @@
 from hashlib import blake2b
 
 import bpy
-import numpy as np
-
-from .attributes import ATTRIBUTE_TYPES, read_attribute
 
 # Marks of the editor, not of the shape.
 _EDITORS_OWN = (".select_vert", ".select_edge", ".select_poly", ".hide_vert", ".hide_edge", ".hide_poly", ".vs.",
@@ -38,6 +35,10 @@ def has_same_modifiers(obj: bpy.types.Object, earlier: str) -> bool:
 
 
 def _mesh_digest(obj: bpy.types.Object) -> str:
+    import numpy as np
+
+    from .attributes import ATTRIBUTE_TYPES, read_attribute
+
     digest = blake2b(digest_size=16)
     mesh = obj.data
     digest.update(repr((len(mesh.vertices), len(mesh.edges), len(mesh.loops), len(mesh.polygons))).encode())

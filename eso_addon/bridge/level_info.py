@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a level knows about itself: custom properties, for the panel, for scripts, and to make it again."""
 
-import json
 from collections.abc import Mapping
 from typing import Any
 
@@ -83,11 +82,15 @@ def level_properties(source: bpy.types.Object, level: int, before: int, after: i
 
 def settings_text(settings: Mapping[str, Any]) -> str:
     """Write settings as one line of JSON."""
+    import json
+
     return json.dumps(dict(settings), sort_keys=True)
 
 
 def settings_of(level: bpy.types.Object) -> dict[str, Any] | None:
     """Read the settings of a level, None if it has none that can be read."""
+    import json
+
     try:
         settings = json.loads(str(level.get(SETTINGS, "")))
     except ValueError:

@@ -5,7 +5,7 @@ from collections.abc import Callable, Collection, Sequence
 
 import bpy
 
-from ..core.mesh import MeshError
+from ..core.errors import MeshError
 
 # Blender cuts longer names without a word, the level's number first.
 MOST_BYTES = 255 if bpy.app.version >= (5, 0) else 63

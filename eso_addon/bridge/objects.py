@@ -5,7 +5,7 @@ from collections.abc import Collection, Iterable, Mapping
 
 import bpy
 
-from ..core.mesh import MeshError
+from ..core.errors import MeshError
 from .modifiers import keep_modifiers
 
 # Custom properties of a result, for scripts and exporters.

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import bpy
 
-from ..core.mesh import MeshError
+from ..core.errors import MeshError
 from . import level_info, objects
 from .level_names import check_free, fitting_names, take_name
 from .modifiers import keep_modifiers

@@ -4,13 +4,11 @@
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .errors import MeshError
+
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
-
-
-class MeshError(ValueError):
-    """A mesh or a request that cannot be worked on; the message says in one line what to do."""
 
 
 def check_mesh(vertices: ArrayLike, faces: ArrayLike) -> tuple[Floats, Ints]:

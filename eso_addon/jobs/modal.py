@@ -6,7 +6,7 @@ from typing import Any
 
 import bpy
 
-from ..core.mesh import MeshError
+from ..core.errors import MeshError
 from ..core.steps import run_to_end
 from .worker import GRACE_SECONDS, Steps, Worker
 

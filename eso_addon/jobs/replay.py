@@ -1,16 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The last run of the engine, kept so that the redo panel replays it: another ratio costs no other run."""
 
+from __future__ import annotations
+
 from collections.abc import Generator
 from dataclasses import fields, is_dataclass, replace
 from hashlib import sha256
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from ..core.levels import SimplifyResult
-from ..core.mesh import check_mesh
-from ..core.options import options_of, targets_of
-from ..core.recording import Recording, recording_steps
 from ..core.steps import scaled
+
+if TYPE_CHECKING:
+    from ..core.levels import SimplifyResult
+    from ..core.recording import Recording
 
 _kept: dict[str, Recording] = {}
 
@@ -42,6 +44,10 @@ def replayed_steps(
     replayed : bool
         Whether no run was needed.
     """
+    from ..core.mesh import check_mesh
+    from ..core.options import options_of, targets_of
+    from ..core.recording import recording_steps
+
     chosen = options_of(options.get("preset", "default"), {k: v for k, v in options.items() if k != "preset"})
     original = check_mesh(vertices, faces)
     counts, errors = targets_of(

@@ -11,8 +11,6 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 _POLL_SECONDS = 0.1
 _LONGEST_SECONDS = 600
 # Read by the other Python: it gets the path that this one has, and knows nothing of Blender.
@@ -50,6 +48,8 @@ def second_opinion_steps(v0: Any, f0: Any, v1: Any, f1: Any, samples: int) -> Ge
     figures : dict
         ``maximum`` and ``mean``, the larger of both directions; empty if pymeshlab failed.
     """
+    import numpy as np
+
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "meshes.npz"
         np.savez(path, v0=v0, f0=f0, v1=v1, f1=f1, samples=samples)

@@ -10,11 +10,9 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper
 
-from ..bridge.stream_objects import mesh_objects, read_objects, stream_steps
-from ..core.mesh import MeshError
+from ..core.errors import MeshError
 from ..core.steps import run_to_end, scaled
 from ..progressive.errors import StreamError
-from ..viewer.page import write_page
 from .polls import poll_with
 from .reports import tell
 
@@ -70,6 +68,9 @@ class EXPORT_MESH_OT_esopm(bpy.types.Operator, ExportHelper):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Read the objects, make the stream, write it in one step."""
+        from ..bridge.stream_objects import mesh_objects, read_objects, stream_steps
+        from ..viewer.page import write_page
+
         started = time.perf_counter()
         chosen = mesh_objects(context, selected=self.use_selection)
         manager = context.window_manager

@@ -11,8 +11,7 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, St
 from bpy_extras.io_utils import ImportHelper
 
 from ..bridge.objects import select_only
-from ..bridge.stream_objects import add_objects, loaded_scene
-from ..core.mesh import MeshError
+from ..core.errors import MeshError
 from ..progressive.errors import StreamError
 from .reports import tell
 from .stream_level import remember
@@ -51,6 +50,8 @@ class IMPORT_MESH_OT_esopm(bpy.types.Operator, ImportHelper):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Read the file and add its objects."""
+        from ..bridge.stream_objects import add_objects, loaded_scene
+
         started = time.perf_counter()
         path = Path(bpy.path.abspath(self.filepath))
         try:

@@ -9,9 +9,7 @@ import bpy
 from bpy.props import EnumProperty, FloatProperty, IntProperty
 
 from ..bridge import level_info, objects
-from ..bridge.bake import bake_normals, why_not_bake
-from ..bridge.lod_sources import meshes_behind
-from ..core.mesh import MeshError
+from ..core.errors import MeshError
 from ..settings.profiles import PROFILES
 from .lod_polls import why_not_update
 from .polls import poll_with
@@ -52,6 +50,8 @@ class OBJECT_OT_eso_lod_bake(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Bake level after level."""
+        from ..bridge.bake import bake_normals
+
         start = time.perf_counter()
         try:
             pairs = self._pairs(context)
@@ -65,6 +65,9 @@ class OBJECT_OT_eso_lod_bake(bpy.types.Operator):
 
     def _pairs(self, context: bpy.types.Context) -> list[tuple[bpy.types.Object, bpy.types.Object]]:
         """Find what is baked from and to, each mesh once, and see that all of it can be."""
+        from ..bridge.bake import why_not_bake
+        from ..bridge.lod_sources import meshes_behind
+
         chosen = meshes_behind(obj for obj in [context.active_object, *context.selected_objects] if obj is not None)
         pairs: dict[bpy.types.Mesh, tuple[bpy.types.Object, bpy.types.Object]] = {}
         for source in chosen:

@@ -4,19 +4,20 @@
 """The operator that writes levels to a file, named and laid out for an engine."""
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import bpy
 from bpy.props import BoolProperty, EnumProperty, StringProperty
 
 from ..bridge import level_info
-from ..bridge.export_levels import ENDINGS, LevelGroup, export_levels, groups_of
-from ..bridge.lod_sources import meshes_behind
-from ..bridge.scene_files import WRITERS, write_stage
-from ..core.mesh import MeshError
+from ..core.errors import MeshError
 from ..settings.profiles import PROFILES
 from .lod_polls import why_not_update
 from .polls import poll_with
 from .reports import tell
+
+if TYPE_CHECKING:
+    from ..bridge.export_levels import LevelGroup
 
 _PROFILES = (
     ("levels", "As Generated", "The profile that the levels were made for"),
@@ -67,6 +68,9 @@ class OBJECT_OT_eso_lod_export(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Write the file."""
+        from ..bridge.export_levels import export_levels
+        from ..bridge.scene_files import WRITERS, write_stage
+
         try:
             groups, key = self._groups(context)
             profile = PROFILES[key]
@@ -82,6 +86,8 @@ class OBJECT_OT_eso_lod_export(bpy.types.Operator):
         return {"FINISHED"}
 
     def _path(self, ending: str) -> Path:
+        from ..bridge.export_levels import ENDINGS
+
         if not self.filepath:
             raise MeshError("no file is named: give its path")
         path = Path(bpy.path.abspath(self.filepath))
@@ -91,8 +97,10 @@ class OBJECT_OT_eso_lod_export(bpy.types.Operator):
             raise MeshError(f"'{path.name}' is of no format that holds levels: use one of {' '.join(ENDINGS)}")
         return path
 
-    def _groups(self, context: bpy.types.Context) -> tuple[list[LevelGroup], str]:
+    def _groups(self, context: bpy.types.Context) -> "tuple[list[LevelGroup], str]":
         """Gather what is to be written, and the profile's key."""
+        from ..bridge.export_levels import groups_of
+
         sources = self._sources(context)
         keys = {str(level.get(level_info.PROFILE, "")) for obj in sources for level in level_info.levels_of(obj)}
         key = self.profile
@@ -109,6 +117,8 @@ class OBJECT_OT_eso_lod_export(bpy.types.Operator):
         return groups, key
 
     def _sources(self, context: bpy.types.Context) -> list[bpy.types.Object]:
+        from ..bridge.lod_sources import meshes_behind
+
         things = bpy.data.objects if self.which == "ALL" else [context.active_object, *context.selected_objects]
         found = meshes_behind(obj for obj in things if obj is not None)
         return [obj for obj in found if level_info.levels_of(obj)]

@@ -1,31 +1,23 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The operator that makes levels of detail of all chosen meshes, in one run of the engine for each."""
 
+from typing import TYPE_CHECKING, Any
+
 import bpy
 
 from ..bridge import level_info, objects
 from ..bridge.instances import instancers, place_instances
-from ..bridge.lod_sources import (
-    LodSource,
-    check_group,
-    engine_inputs,
-    meshes_behind,
-    name_meshes,
-    read_sources,
-    told_of,
-    write_chains,
-)
-from ..bridge.place_levels import Place, place_levels, plan_places
-from ..core.chains import Chain, chains_steps
-from ..core.mesh import MeshError
+from ..core.errors import MeshError
 from ..jobs.modal import EngineOperator
 from ..jobs.worker import Steps
 from ..settings.lod_options import LodOptions
-from ..settings.lod_record import LodSettings
 from ..settings.profiles import PROFILES
 from .lod_polls import why_not_generate
 from .polls import poll_with
 from .reports import notes_of, tell
+
+if TYPE_CHECKING:
+    from ..core.chains import Chain
 
 
 class OBJECT_OT_eso_lod_generate(EngineOperator, LodOptions, bpy.types.Operator):
@@ -35,9 +27,9 @@ class OBJECT_OT_eso_lod_generate(EngineOperator, LodOptions, bpy.types.Operator)
     bl_label = "ESO Generate LODs"
     bl_options = {"REGISTER", "UNDO", "PRESET"}
 
-    _settings: LodSettings
-    _sources: list[LodSource]
-    _places: list[Place]
+    _settings: Any  # LodSettings
+    _sources: list[Any]  # LodSource
+    _places: list[Any]  # Place
     _empties: list[bpy.types.Object]
 
     @classmethod
@@ -52,8 +44,12 @@ class OBJECT_OT_eso_lod_generate(EngineOperator, LodOptions, bpy.types.Operator)
         self.draw_keep(self.layout)
         self.draw_engine(self.layout)
 
-    def prepare(self, context: bpy.types.Context) -> Steps[list[Chain]]:
+    def prepare(self, context: bpy.types.Context) -> "Steps[list[Chain]]":
         """Read the meshes, and see that their levels will have names and places."""
+        from ..bridge.lod_sources import check_group, engine_inputs, meshes_behind, read_sources
+        from ..bridge.place_levels import plan_places
+        from ..core.chains import chains_steps
+
         self._settings = self.lod_settings()
         goals = self._settings.goals()
         chosen = self._chosen(context)
@@ -74,8 +70,11 @@ class OBJECT_OT_eso_lod_generate(EngineOperator, LodOptions, bpy.types.Operator)
         options = [self._settings.options(own) for own in inputs]
         return chains_steps(meshes, goals, options, [len(source.objects) for source in self._sources])
 
-    def finish(self, context: bpy.types.Context, result: list[Chain]) -> None:
+    def finish(self, context: bpy.types.Context, result: "list[Chain]") -> None:
         """Write the levels as objects, the finest first."""
+        from ..bridge.lod_sources import name_meshes, told_of, write_chains
+        from ..bridge.place_levels import place_levels
+
         place_of = {place.source: place for place in self._places}
         made: list[bpy.types.Object] = []
         names_of = [place_of[source.objects[0]].names for source in self._sources]
@@ -101,7 +100,7 @@ class OBJECT_OT_eso_lod_generate(EngineOperator, LodOptions, bpy.types.Operator)
             return list(_collection(context, self.source_collection).all_objects)
         return [obj for obj in (context.active_object, *context.selected_objects) if obj is not None]
 
-    def _tell(self, context: bpy.types.Context, chains: list[Chain]) -> None:
+    def _tell(self, context: bpy.types.Context, chains: "list[Chain]") -> None:
         lines = []
         for source, chain in zip(self._sources, chains, strict=True):
             before, many = len(source.arrays.triangles), len(self._sources) > 1
@@ -121,11 +120,10 @@ class OBJECT_OT_eso_lod_generate(EngineOperator, LodOptions, bpy.types.Operator)
         tell(self, context, title + (f" and {more} more" if more else ""), [*lines, f"{self.seconds:.2f} s"],
              dict.fromkeys(notes))
 
-
     def _label(self, number: int) -> str:
         return PROFILES[self.profile].scene_name("", number).lstrip("_")
 
-    def _sums(self, chains: list[Chain]) -> list[str]:
+    def _sums(self, chains: "list[Chain]") -> list[str]:
         """Give for each level the triangles of all objects together; those with fewer levels count with their last."""
         copies = [len(source.objects) for source in self._sources]
         most = max(len(chain.levels) for chain in chains)

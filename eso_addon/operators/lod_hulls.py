@@ -7,11 +7,8 @@ import bpy
 from bpy.props import EnumProperty
 
 from ..bridge import level_info, objects
-from ..bridge.hulls import add_hulls
 from ..bridge.level_names import check_free
-from ..bridge.lod_sources import meshes_behind
-from ..bridge.place_levels import remove_with_mesh
-from ..core.mesh import MeshError
+from ..core.errors import MeshError
 from ..settings.profiles import PROFILES
 from .lod_polls import why_not_update
 from .polls import poll_with
@@ -39,6 +36,8 @@ class OBJECT_OT_eso_lod_hulls(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Replace the hulls that are there."""
+        from ..bridge.lod_sources import meshes_behind
+
         chosen = meshes_behind([obj for obj in [context.active_object, *context.selected_objects] if obj is not None])
         sources = {obj: level_info.levels_of(obj) for obj in chosen}
         sources = {obj: levels for obj, levels in sources.items() if levels}
@@ -55,6 +54,9 @@ class OBJECT_OT_eso_lod_hulls(bpy.types.Operator):
         return {"FINISHED"}
 
     def _replace(self, source: bpy.types.Object, finest: bpy.types.Object) -> list[bpy.types.Object]:
+        from ..bridge.hulls import add_hulls
+        from ..bridge.place_levels import remove_with_mesh
+
         profile = PROFILES.get(str(finest.get(level_info.PROFILE, "")), PROFILES["plain"])
         old = level_info.hulls_of(source)
         if not profile.hull:

@@ -4,22 +4,22 @@
 """The operator that makes levels again, in place, from what they say about themselves."""
 
 from collections.abc import Generator
+from typing import TYPE_CHECKING, Any
 
 import bpy
 from bpy.props import BoolProperty, EnumProperty
 
 from ..bridge import level_info
-from ..bridge.lod_sources import LodSource, engine_inputs, read_sources, told_of, write_chains
-from ..bridge.place_levels import put_mesh
-from ..core.chains import Chain, chains_steps
-from ..core.mesh import MeshError
+from ..core.errors import MeshError
 from ..core.steps import scaled
 from ..jobs.modal import EngineOperator
 from ..jobs.worker import Steps
-from ..settings.lod_record import LodSettings
 from .lod_polls import why_not_update
 from .polls import poll_with
 from .reports import notes_of, tell
+
+if TYPE_CHECKING:
+    from ..core.chains import Chain
 
 _WHICH = (
     ("SELECTED", "Selected", "Levels of the selected objects, which may be sources or levels"),
@@ -39,15 +39,18 @@ class OBJECT_OT_eso_lod_update(EngineOperator, bpy.types.Operator):
         name="Only Stale", description="Leave levels alone whose source is as it was", default=True
     )
 
-    _sources: list[tuple[LodSource, LodSettings]]
+    _sources: list[tuple[Any, Any]]  # LodSource and LodSettings
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Need levels."""
         return poll_with(cls, why_not_update(context))
 
-    def prepare(self, context: bpy.types.Context) -> Steps[list[Chain]]:
+    def prepare(self, context: bpy.types.Context) -> "Steps[list[Chain]]":
         """Read the sources of the levels, those with the same settings and the same mesh together."""
+        from ..bridge.lod_sources import read_sources
+        from ..settings.lod_record import LodSettings
+
         self._sources = []
         by_settings: dict[str, list[bpy.types.Object]] = {}
         for source in self._chosen(context):
@@ -60,8 +63,11 @@ class OBJECT_OT_eso_lod_update(EngineOperator, bpy.types.Operator):
             self._sources += [(source, settings) for source in read]
         return self._steps()
 
-    def finish(self, context: bpy.types.Context, result: list[Chain]) -> None:
+    def finish(self, context: bpy.types.Context, result: "list[Chain]") -> None:
         """Put the new meshes in the place of the old ones."""
+        from ..bridge.lod_sources import told_of, write_chains
+        from ..bridge.place_levels import put_mesh
+
         lines, notes = [], []
         written = [
             write_chains([source], [chain], [["eso_lod new level"] * len(chain.levels)], settings.writing)[0]
@@ -86,7 +92,10 @@ class OBJECT_OT_eso_lod_update(EngineOperator, bpy.types.Operator):
         tell(self, context, "Updated levels", [*(lines or ["all were up to date"]), f"{self.seconds:.2f} s"],
              dict.fromkeys(notes))
 
-    def _steps(self) -> Generator[float, None, list[Chain]]:
+    def _steps(self) -> "Generator[float, None, list[Chain]]":
+        from ..bridge.lod_sources import engine_inputs
+        from ..core.chains import chains_steps
+
         chains: list[Chain] = []
         for number, (source, settings) in enumerate(self._sources):
             mesh = source.arrays.vertices, source.arrays.triangles

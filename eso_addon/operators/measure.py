@@ -4,20 +4,20 @@
 """The operator that measures how far the active mesh deviates from its original."""
 
 from collections.abc import Generator
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import bpy
-import numpy as np
 from bpy.props import BoolProperty, EnumProperty, IntProperty
 
-from ..bridge.read_mesh import MeshArrays, read_mesh
-from ..core.deviation import Deviation, measure_steps
-from ..jobs import second_opinion
 from ..jobs.modal import EngineOperator
 from ..jobs.worker import Steps
 from ..settings.preferences import preferences
 from .polls import measured_pair, poll_with, why_not_measure
 from .reports import tell
+
+if TYPE_CHECKING:
+    from ..bridge.read_mesh import MeshArrays
+    from ..core.deviation import Deviation
 
 _SPACES = (
     ("local", "Local", "Compare the shapes, wherever the objects stand"),
@@ -48,23 +48,28 @@ class OBJECT_OT_eso_measure(EngineOperator, bpy.types.Operator):
         """Need two meshes."""
         return poll_with(cls, why_not_measure(context))
 
-    def prepare(self, context: bpy.types.Context) -> Steps[Deviation]:
+    def prepare(self, context: bpy.types.Context) -> "Steps[Deviation]":
         """Read both meshes."""
+        from ..jobs import second_opinion
+
         original, simplified = measured_pair(context)
         self._title = f"{simplified.name} against {original.name}"
         one, other = self._read(original), self._read(simplified)
         arrays = one.vertices, one.triangles, other.vertices, other.triangles
         return self._both(arrays, ask=preferences().use_pymeshlab and second_opinion.is_there())
 
-    def _both(self, arrays: tuple[Any, Any, Any, Any], *, ask: bool) -> Generator[float, None, Deviation]:
+    def _both(self, arrays: tuple[Any, Any, Any, Any], *, ask: bool) -> "Generator[float, None, Deviation]":
         """Measure, and let pymeshlab measure too where the preferences want it."""
+        from ..core.deviation import measure_steps
+        from ..jobs import second_opinion
+
         self._second = {}
         result = yield from measure_steps(*arrays, samples=self.samples)
         if ask:
             self._second = yield from second_opinion.second_opinion_steps(*arrays, self.samples)
         return result
 
-    def finish(self, context: bpy.types.Context, result: Deviation) -> None:
+    def finish(self, context: bpy.types.Context, result: "Deviation") -> None:
         """Report the figures; nothing is written."""
         both = result.symmetric
         lines = [
@@ -79,7 +84,11 @@ class OBJECT_OT_eso_measure(EngineOperator, bpy.types.Operator):
         ]
         tell(self, context, self._title, lines)
 
-    def _read(self, obj: bpy.types.Object) -> MeshArrays:
+    def _read(self, obj: bpy.types.Object) -> "MeshArrays":
+        import numpy as np
+
+        from ..bridge.read_mesh import read_mesh
+
         world = np.array(obj.matrix_world, np.float64) if self.space == "world" else None
         return read_mesh(obj, apply_modifiers=self.apply_modifiers, transform=world)
 

@@ -1,12 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Has the engine's results probe their errors in a thread, not in the window's: before the end, or after a replay."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Generator
+from typing import TYPE_CHECKING
 
 import bpy
 
-from ..core.levels import SimplifyResult
 from ..jobs.worker import Worker
+
+if TYPE_CHECKING:
+    from ..core.levels import SimplifyResult
 
 _POLL_SECONDS = 0.1
 _asked: list[Worker[None]] = []

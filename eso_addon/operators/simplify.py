@@ -1,18 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The operator that makes one version of the active mesh with fewer triangles."""
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import bpy
 
 from ..bridge import objects
 from ..bridge.modifiers import live_modifiers, switched_off
-from ..bridge.read_mesh import MeshArrays, read_mesh
-from ..bridge.regions import group_options, outside_selection, target_for_selection
-from ..bridge.write_mesh import write_mesh
-from ..core.levels import SimplifyResult
-from ..core.mesh import MeshError
-from ..core.screen import extent_of
+from ..core.errors import MeshError
 from ..jobs.modal import EngineOperator
 from ..jobs.replay import replayed_steps
 from ..jobs.worker import Steps
@@ -21,16 +16,21 @@ from .polls import poll_with, why_not_simplify
 from .probing import known_error, probe_later, with_errors_if_run
 from .reports import error_text, notes_of, tell, tell_error, triangles
 
+if TYPE_CHECKING:
+    from ..core.levels import SimplifyResult
+
 
 class SimplifyReading(EngineOperator, SimplifyOptions):
     """What Simplify and the level slider share: read the active mesh, run the engine or replay its last run."""
 
     _object: bpy.types.Object
-    _source: MeshArrays
+    _source: Any  # MeshArrays
     _live: list[str]
 
-    def prepare(self, context: bpy.types.Context) -> Steps[list[SimplifyResult]]:
+    def prepare(self, context: bpy.types.Context) -> "Steps[list[SimplifyResult]]":
         """Read the active mesh."""
+        from ..bridge.read_mesh import read_mesh
+
         self._object = context.active_object
         reason = objects.why_not_in_place(self._object) if self.in_place else ""
         if reason:
@@ -45,6 +45,9 @@ class SimplifyReading(EngineOperator, SimplifyOptions):
 
     def _asked(self) -> tuple[dict[str, Any], dict[str, Any]]:
         """Give the target, and the engine's options for parts that are treated apart."""
+        from ..bridge.regions import group_options, outside_selection, target_for_selection
+        from ..core.screen import extent_of
+
         source, target, regions = self._source, self.simplify_target(), {}
         if self.target == "screen":
             extent = extent_of(source.vertices, source.triangles)
@@ -85,8 +88,10 @@ class OBJECT_OT_eso_simplify(SimplifyReading, bpy.types.Operator):
             seconds = context.window_manager.eso_last_run.seconds
             self.layout.label(text=f"Refit: {seconds:.1f} s", icon="TIME", translate=False)
 
-    def finish(self, context: bpy.types.Context, results: list[SimplifyResult]) -> None:
+    def finish(self, context: bpy.types.Context, results: "list[SimplifyResult]") -> None:
         """Write the result beside the source, or in its place."""
+        from ..bridge.write_mesh import write_mesh
+
         result, obj = results[0], self._object
         before, after, error = len(self._source.triangles), len(result.faces), known_error(result)
         objects.leave_edit_mode(obj)

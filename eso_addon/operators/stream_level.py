@@ -5,15 +5,17 @@
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import bpy
 from bpy.props import FloatProperty, IntProperty, PointerProperty, StringProperty
 
-from ..bridge.stream_objects import loaded_scene, replace_level
-from ..core.mesh import MeshError
+from ..core.errors import MeshError
 from ..progressive.errors import StreamError
-from ..progressive.progressive import Level
-from ..progressive.scene import Scene
+
+if TYPE_CHECKING:
+    from ..progressive.progressive import Level
+    from ..progressive.scene import Scene
 
 _quiet = False  # the property is being set to what is shown already
 
@@ -22,6 +24,8 @@ def _show(self: "EsoStream", context: bpy.types.Context) -> None:
     """Give the object, and all that show its mesh, the level of the slider."""
     if _quiet or not self.path:
         return
+    from ..bridge.stream_objects import loaded_scene, replace_level
+
     obj = self.id_data
     if obj.mode == "EDIT":
         self.trouble = "Leave Edit Mode to change the level"
@@ -63,7 +67,7 @@ class EsoStream(bpy.types.PropertyGroup):
         max=100.0, default=100.0, update=_show)
 
 
-def remember(objects: Sequence[bpy.types.Object], path: Path, scene: Scene, levels: Sequence[Level]) -> None:
+def remember(objects: Sequence[bpy.types.Object], path: Path, scene: "Scene", levels: "Sequence[Level]") -> None:
     """Tell new objects where their meshes come from; in the order of `add_objects`."""
     entries = scene.meta.get("objects") or [{"mesh": number} for number in range(len(scene.meshes))]
     for obj, entry in zip(objects, entries, strict=True):

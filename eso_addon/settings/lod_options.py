@@ -3,15 +3,19 @@
 # mypy: disable-error-code="valid-type"
 """The options of a chain of levels as Blender properties, once, for the panel and for the operators."""
 
+from typing import TYPE_CHECKING
+
 import bpy
 from bpy.props import BoolProperty, EnumProperty, StringProperty
 
-from ..core.mesh import MeshError
+from ..core.errors import MeshError
 from .keep_options import KeepOptions
-from .lod_record import LodSettings, ordered_goals
 from .options import EngineOptions
 from .profiles import PROFILES
 from .screen_options import ScreenOptions
+
+if TYPE_CHECKING:
+    from .lod_record import LodSettings
 
 _SCOPES = (
     ("SELECTED", "Selected", "Levels of every selected mesh, and of the meshes that selected empties instance"),
@@ -109,6 +113,8 @@ class LodOptions(EngineOptions, KeepOptions, ScreenOptions):
         MeshError
             The list cannot be read, names a level twice, or has more levels than the profile takes.
         """
+        from .lod_record import ordered_goals
+
         text, kind = getattr(self, _LIST_OF[self.levels_by]), self.levels_by
         goals = ordered_goals(kind, _numbers(text, whole=kind in ("count", "budget")))
         reason = PROFILES[self.profile].why_not(len(goals))
@@ -116,8 +122,10 @@ class LodOptions(EngineOptions, KeepOptions, ScreenOptions):
             raise MeshError(reason)
         return kind, goals
 
-    def lod_settings(self) -> LodSettings:
+    def lod_settings(self) -> "LodSettings":
         """Give all of it as plain data."""
+        from .lod_record import LodSettings
+
         kind, goals = self.level_goals()
         live = {"ARMATURE": True, "MIRROR": self.live_mirror, "SUBSURF": self.live_subdivision}
         return LodSettings(

@@ -3,15 +3,17 @@
 # mypy: disable-error-code="valid-type"
 """The options of the engine as Blender properties, once, for the panel and for the operators; words as in the API."""
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
 
-from ..core.screen import Screen
 from .keep_options import KeepOptions
 from .preferences import preferences
 from .screen_options import ScreenOptions
+
+if TYPE_CHECKING:
+    from ..core.screen import Screen
 
 _TARGETS = (
     ("ratio", "Ratio", "Keep this share of the triangles"),
@@ -175,8 +177,10 @@ class SimplifyOptions(EngineOptions, KeepOptions, ScreenOptions):
         else:
             layout.prop(self, _TARGET_NAMES[self.target])
 
-    def screen(self) -> Screen:
+    def screen(self) -> "Screen":
         """Give the picture in which an error is judged."""
+        from ..core.screen import Screen
+
         return Screen(**self.screen_settings())
 
     def simplify_target(self) -> dict[str, Any]:
