@@ -337,8 +337,10 @@ def _export_gltf(kind: str) -> Callable[[Path], None]:
 
     def write(path: Path) -> None:
         live = {modifier.type for obj in bpy.context.selected_objects for modifier in obj.modifiers} - {"ARMATURE"}
+        # a folder of its own: textures of two models may have the same name
+        folder = {"export_texture_dir": f"{path.stem}_textures"} if kind == "GLTF_SEPARATE" else {}
         _export_with("export_scene.gltf", use_selection=True, use_active_scene=True, export_format=kind,
-                     export_apply=bool(live))(path)
+                     export_apply=bool(live), **folder)(path)
 
     return write
 

@@ -22,7 +22,7 @@ def atomic_output(target: str | os.PathLike[str]) -> Iterator[Path]:
     ------
     Path
         A path with the target's name in a temporary folder beside it. Files that are written next to it (an .mtl,
-        a .bin) move with it, before it.
+        a .bin, a folder of textures) move with it, before it.
 
     Raises
     ------
@@ -45,9 +45,10 @@ def atomic_output(target: str | os.PathLike[str]) -> Iterator[Path]:
         yield draft
         if not draft.is_file():
             raise OSError(f"cannot write {target}: nothing was written")
-        for companion in folder.iterdir():
-            if companion != draft:
-                os.replace(companion, target.parent / companion.name)
+        for companion in [path for path in folder.rglob("*") if path.is_file() and path != draft]:
+            place = target.parent / companion.relative_to(folder)
+            place.parent.mkdir(parents=True, exist_ok=True)
+            os.replace(companion, place)
         os.replace(draft, target)
     finally:
         shutil.rmtree(folder, ignore_errors=True)

@@ -212,6 +212,32 @@ def test_what_becomes_of_a_child(child: str, tmp_path: Path, do: str, told: str,
     work_off(child, {"do": "well"}, 60, 2**28, keep=False)
 
 
+def test_textures_of_two_models_in_a_folder(tmp_path: Path) -> None:
+    bpy = pytest.importorskip("bpy")
+    from eso_addon.bridge.scene_files import start_empty
+
+    (tmp_path / "in").mkdir()
+    for name, colour in (("red", (1, 0, 0, 1)), ("blue", (0, 0, 1, 1))):
+        start_empty()
+        bpy.ops.mesh.primitive_monkey_add()
+        image = bpy.data.images.new("paint", 4, 4)
+        image.pixels = colour * 16
+        image.pack()
+        material = bpy.data.materials.new("skin")
+        material.use_nodes = True
+        node = material.node_tree.nodes.new("ShaderNodeTexImage")
+        node.image = image
+        shader = material.node_tree.nodes["Principled BSDF"]
+        material.node_tree.links.new(node.outputs["Color"], shader.inputs["Base Color"])
+        bpy.context.object.data.materials.append(material)
+        bpy.ops.export_scene.gltf(filepath=str(tmp_path / f"in/{name}.glb"))
+    assert batch(tmp_path / "in", tmp_path / "out", "--ratios", "0.5", "--format", ".gltf", "--workers", 1) == 0
+    for name, colour in (("red", (1, 0, 0, 1)), ("blue", (0, 0, 1, 1))):
+        start_empty()
+        bpy.ops.import_scene.gltf(filepath=str(tmp_path / f"out/{name}.gltf"))
+        assert [tuple(image.pixels)[:4] for image in bpy.data.images if image.size[0]] == [colour]
+
+
 def test_names_that_meet_are_told_apart(tmp_path: Path) -> None:
     for name in ("in/a.obj", "in/a.ply", "in/A.off", "in/b.obj", "in/sub/a.obj", "in/a.obj.glb"):
         ball(tmp_path / name)

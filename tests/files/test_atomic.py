@@ -18,6 +18,22 @@ def test_the_target_appears_at_the_end(tmp_path: Path) -> None:
     assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {"mesh.obj": "new", "mesh.mtl": "material"}
 
 
+def test_a_folder_beside_it_takes_new_files_and_keeps_others(tmp_path: Path) -> None:
+    (tmp_path / "mesh_textures").mkdir()
+    for name in ("mine.png", "shared.png"):
+        (tmp_path / "mesh_textures" / name).write_text("old")
+    with atomic_output(tmp_path / "mesh.gltf") as draft:
+        draft.write_text("new")
+        (draft.parent / "mesh_textures/deep").mkdir(parents=True)
+        (draft.parent / "empty").mkdir()
+        for name in ("shared.png", "deep/one.png"):
+            (draft.parent / "mesh_textures" / name).write_text("new")
+    found = {path.relative_to(tmp_path).as_posix(): path.read_text() for path in tmp_path.rglob("*") if path.is_file()}
+    assert found == {"mesh.gltf": "new", "mesh_textures/mine.png": "old", "mesh_textures/shared.png": "new",
+                     "mesh_textures/deep/one.png": "new"}
+    assert not (tmp_path / "empty").exists()
+
+
 def test_a_failure_leaves_everything_as_it_was(tmp_path: Path) -> None:
     target = tmp_path / "mesh.obj"
     target.write_text("old")
