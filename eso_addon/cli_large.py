@@ -48,6 +48,7 @@ def is_large(args: argparse.Namespace) -> bool:
 
 def simplify_file(args: argparse.Namespace, options: dict[str, Any]) -> None:
     """Simplify a file in pieces."""
+    from .farm.batch import stopping_well
     from .farm.large import Plan, simplify_large
     from .farm.machine import cores, memory_left
     from .files.pieces import open_triangles
@@ -62,11 +63,14 @@ def simplify_file(args: argparse.Namespace, options: dict[str, Any]) -> None:
         count -= 1  # few large cells are better than many small ones
     if not args.output.parent.is_dir():
         raise FileNotFoundError(f"cannot write {args.output.name}: the folder {args.output.parent} does not exist")
-    with tempfile.TemporaryDirectory(prefix=".eso_lod_", dir=args.output.parent) as folder:
-        plan = Plan(limit, count, lambda requests: _run(requests, plan.of_worker, count, args.scheduler), _tell,
-                    threads)
-        result = simplify_large(source, _target(args), options, Path(folder), plan)
-        _write(args.output, result, source.dtype)
+    try:
+        with stopping_well(), tempfile.TemporaryDirectory(prefix=".eso_lod_", dir=args.output.parent) as folder:
+            plan = Plan(limit, count, lambda requests: _run(requests, plan.of_worker, count, args.scheduler), _tell,
+                        threads)
+            result = simplify_large(source, _target(args), options, Path(folder), plan)
+            _write(args.output, result, source.dtype)
+    except KeyboardInterrupt:
+        raise ValueError(f"stopped: {args.output.name} was not written") from None
     _report(args, source, result, time.perf_counter() - started)
 
 
@@ -97,7 +101,7 @@ def _run(requests: Any, limit: int, count: int, scheduler: str) -> Any:  # noqa:
     from concurrent.futures import ThreadPoolExecutor
 
     from .farm.batch import Farm, client_of
-    from .farm.child import work_off
+    from .farm.child import STOPPING, work_off
 
     if scheduler:
         with client_of(Farm(scheduler, count, _FOREVER, limit)) as client:
@@ -112,7 +116,9 @@ def _run(requests: Any, limit: int, count: int, scheduler: str) -> Any:  # noqa:
         for future in futures:
             yield future.result()
     finally:
+        STOPPING.set()  # of use after an error or Ctrl-C: nobody waits for cells that nobody wants
         pool.shutdown(cancel_futures=True)
+        STOPPING.clear()
 
 
 def _write(path: Path, result: Any, dtype: Any) -> None:  # noqa: ANN401 - a Large

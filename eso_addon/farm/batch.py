@@ -7,6 +7,7 @@ import importlib.util
 import logging
 import os
 import signal
+import threading
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
@@ -186,6 +187,10 @@ def _started(make: Callable[..., Any], workers: int) -> Any:  # noqa: ANN401 - D
 @contextmanager
 def stopping_well() -> Iterator[None]:
     """Take the system's wish that this process ends for Ctrl-C, so that a run ends in order."""
+    if threading.current_thread() is not threading.main_thread():  # which alone hears of it
+        yield
+        return
+
     def stop(*_: object) -> None:
         raise KeyboardInterrupt
 

@@ -22,6 +22,7 @@ from typing import Any
 _ROOT = Path(__file__).resolve().parents[2]
 _POLL = 0.05  # seconds between two looks at the memory
 _OWN_FAULT, _ANY_FAULT = 2, 6  # times that a request is begun; more where it was killed from outside
+STOPPING = threading.Event()  # while it is set, children give up what they are at
 
 
 class Child:
@@ -83,6 +84,8 @@ class Child:
             try:
                 line = self._answers.get(timeout=_POLL)
             except queue.Empty:
+                if STOPPING.is_set():
+                    return self._give_up("stopped")
                 used = resident(self._process.pid)
                 self.peak = max(self.peak, used)
                 if used > memory:
@@ -155,7 +158,7 @@ def work_off(module: str, request: Mapping[str, Any], timeout: float, memory: in
         answer = child.ask(request, timeout, memory)
         tries += 1
         own += answer.get("fault") == "own"
-        if "fault" not in answer or own >= _OWN_FAULT or tries >= _ANY_FAULT:
+        if "fault" not in answer or own >= _OWN_FAULT or tries >= _ANY_FAULT or STOPPING.is_set():
             break
     if not keep or answer.get("error") or resident_of(child) > memory // 2:  # the next one begins with a clean slate
         child.close()
