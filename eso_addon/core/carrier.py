@@ -10,15 +10,17 @@ from numpy.typing import NDArray
 
 from .adjacency import components
 from .attributes import AttributeSet, Layer, blended
-from .blocks import Blocks
 from .carried import Carried
-from .carry import Places, find_places
+from .carry import Ground, Places, find_places, numbered
 from .edge_data import carried_edges
 from .lines import Lines
 from .mesh import Bools, Floats, Ints
 from .prepare import Prepared
 from .symmetry import Mirror, completed
 from .unflip import areas_of, mapped_by_source, turned_back
+
+# faces up to which what levels are laid on is kept for the next one
+_MOST_KEPT = 500_000
 
 
 class _Level(NamedTuple):
@@ -60,6 +62,7 @@ class Carrier:
         self._own = attributes if mirror is None else mirror.of_half(attributes)
         faces = original[1] if mirror is None else original[1][mirror.half]
         self._points = np.ascontiguousarray(original[0].take(mesh.source, axis=0).T)
+        self._ground: Ground | None = None
         self._vertex = faces.ravel().take(lines.corner)  # the input's vertex at each corner
         self._held = locked.copy()
         self._held[lines.edges] = True
@@ -111,11 +114,10 @@ class Carrier:
         if self._mirror is not None:
             placed = self._flattened(placed, survivor, self._mirror)
         there = np.concatenate((placed.T, np.zeros((3, 1))), axis=1)
-        blocks = Blocks()
-        try:
-            places = find_places(self._lines, self._points, survivor, there, blocks)
-        finally:
-            blocks.close()
+        ground = self._ground or Ground(self._lines, self._points)
+        if self._lines.faces.shape[1] <= _MOST_KEPT:
+            self._ground = ground
+        places = find_places(ground, survivor, there)
         # the engine may wind a face the other way than the input does
         rows = np.tile(np.arange(3)[:, None], len(face_map))
         if self._mesh.turned is not None:
@@ -206,11 +208,13 @@ class Carrier:
         group = _in_order(group, places.vertex)
         sheet = np.zeros(len(one), np.int64) if self._mesh.sheet is None else self._mesh.sheet
         count = int(sheet.max(initial=0)) + 1
-        keys, first, number = np.unique(group.take(target) * count + sheet.take(vertex.take(slot)),
-                                        return_index=True, return_inverse=True)
+        groups = int(group.max(initial=-1)) + 1
+        keys, number = numbered(group.take(target) * count + sheet.take(vertex.take(slot)), groups * count)
+        wedge_of = np.zeros(len(keys), np.int64)
+        wedge_of[number[::-1]] = target[::-1]  # of several the first holds
         wanted = np.where(one < 0, -1, group.take(wedges.take(one, mode="clip")) * count + sheet)
         found = np.searchsorted(keys, wanted).clip(max=len(keys) - 1)
-        return number.ravel(), target.take(first), np.where(keys[found] == wanted, found, -1)
+        return number, wedge_of, np.where(keys[found] == wanted, found, -1)
 
 
 def _in_order(group: Ints, vertex: Ints) -> Ints:

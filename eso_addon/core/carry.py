@@ -7,18 +7,18 @@ corners takes its values from the point closest to it on the faces around that p
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
 from .adjacency import components
 from .blocks import Blocks
-from .closest import closest_in_triangles, triangle_frames
+from .closest import closest_in_triangles, squared_distances, triangle_frames
 from .lines import Lines
 from .mesh import Floats, Ints
 
 _BLOCK = 16384
-_NONE = np.iinfo(np.int64).max
 
 
 class Places(NamedTuple):
@@ -42,8 +42,8 @@ class Places(NamedTuple):
     vertex: Ints
 
 
-def find_places(lines: Lines, points: Floats, survivor: Ints, placed: Floats, blocks: Blocks) -> Places:
-    """Find where each wedge of a level lies on the original.
+class Ground:
+    """What of the original every level is laid on; kept, so that a second level costs less.
 
     Parameters
     ----------
@@ -51,41 +51,77 @@ def find_places(lines: Lines, points: Floats, survivor: Ints, placed: Floats, bl
         Of the engine's mesh.
     points : ndarray, (3, n) float64
         The engine's vertices where they stood, in the level's units.
+    """
+
+    def __init__(self, lines: Lines, points: Floats) -> None:
+        self.lines, self.points = lines, points
+        wedges = lines.wedge.ravel()
+        self.slot = np.zeros(int(wedges.max(initial=-1)) + 1, np.int64)  # (w,) the first corner of each wedge
+        self.slot[wedges[::-1]] = np.arange(len(wedges))[::-1]
+        self.vertex = lines.faces.ravel().take(self.slot)
+        self.places = points.take(self.vertex, axis=1)
+        self._frames = np.empty((15, lines.faces.shape[1]))
+        self._framed = np.zeros(lines.faces.shape[1], bool)
+
+    @cached_property
+    def spheres(self) -> Floats:
+        """(4, m): a centre and a radius around each face."""
+        a, b, c = (self.points.take(row, axis=1) for row in self.lines.faces)
+        middle = (a + b + c) / 3
+        far = np.maximum(np.maximum(_square(a - middle), _square(b - middle)), _square(c - middle))
+        return np.concatenate((middle, np.sqrt(far)[None]))
+
+    def frames(self, faces: Ints) -> Floats:
+        """Return the frames of all faces, (15, m); only those that were asked for once have been written."""
+        asked = np.zeros(len(self._framed), bool)
+        asked[faces] = True
+        new = np.flatnonzero(asked & ~self._framed)
+        if len(new):
+            corners = np.ascontiguousarray(self.lines.faces.take(new, axis=1).T)
+            self._frames[:, new] = triangle_frames(self.points.T, corners)
+            self._framed[new] = True
+        return self._frames
+
+
+def find_places(ground: Ground, survivor: Ints, placed: Floats) -> Places:
+    """Find where each wedge of a level lies on the original.
+
+    Parameters
+    ----------
+    ground : Ground
     survivor : ndarray, (n,) int64
         The level's vertex that each has become.
     placed : ndarray, (3, k) float64
         Positions of the level's vertices.
-    blocks : Blocks
     """
-    faces = lines.faces
-    merged = survivor.take(faces)
-    target, vertex = _targets(lines, merged, survivor)
+    faces = ground.lines.faces
+    number, vertex = _targets(ground, survivor.take(faces), survivor)
+    target = number.take(ground.lines.wedge)
     there = placed.take(vertex, axis=1)
-    corner = _nearest_corners(points, faces, target, there, blocks)
+    corner, reach = _nearest_corners(ground, number, there)
     count = faces.shape[1]
     face, weights = corner % count, np.zeros((3, len(vertex)))
     weights[corner // count, np.arange(len(vertex))] = 1
-    moved = np.flatnonzero((points.take(faces.ravel().take(corner), axis=1) != there).any(axis=0))
+    moved = np.flatnonzero(reach > 0)
     if len(moved):
-        face[moved], weights[:, moved] = _closest(points, faces, target, there, corner, moved, blocks)
+        face[moved], weights[:, moved] = _closest(ground, target, there, reach, moved)
     return Places(target, face, weights, vertex)
 
 
-def _targets(lines: Lines, merged: Ints, survivor: Ints) -> tuple[Ints, Ints]:
-    """Return the level's wedge of each corner, (3, m), and the vertex of each wedge.
+def _targets(ground: Ground, merged: Ints, survivor: Ints) -> tuple[Ints, Ints]:
+    """Return the level's wedge that each of the original's has become, and the vertex of each of the level's.
 
     Wedges become one where their vertices do and a face has both: that face is on one side of every line.
     """
-    wedge = lines.wedge
-    count = int(wedge.max(initial=-1)) + 1
-    vertex_of = np.zeros(count, np.int64)
-    vertex_of[wedge] = merged
+    wedge, count = ground.lines.wedge, len(ground.slot)
+    vertex_of = survivor.take(ground.vertex)
     # a vertex that stands for no line has one wedge, whatever became it
     lined = np.zeros(int(survivor.max(initial=-1)) + 1, bool)
-    lined[survivor.compress(lines.parted)] = True
+    lined[survivor.compress(ground.lines.parted)] = True
     first = np.full(len(lined), count)
-    np.minimum.at(first, vertex_of, np.arange(count))
-    number = np.where(lined.take(vertex_of), np.arange(count), first.take(vertex_of))
+    first[vertex_of[::-1]] = np.arange(count)[::-1]  # of several the first holds
+    on_line = lined.take(vertex_of)
+    number = np.where(on_line, np.arange(count), first.take(vertex_of))
     ones, others = [], []
     for side in range(3):
         following = (side + 1) % 3
@@ -93,66 +129,58 @@ def _targets(lines: Lines, merged: Ints, survivor: Ints) -> tuple[Ints, Ints]:
         ones.append(wedge[side].take(inside))
         others.append(wedge[following].take(inside))
     part = components(count, np.concatenate(ones), np.concatenate(others))
-    number = np.where(lined.take(vertex_of), count + part, number)
-    names, number = np.unique(number, return_inverse=True)
+    names, number = numbered(np.where(on_line, count + part, number), 2 * count)
     vertex = np.zeros(len(names), np.int64)
     vertex[number] = vertex_of
-    return number.take(wedge), vertex
+    return number, vertex
 
 
-def _nearest_corners(points: Floats, faces: Ints, target: Ints, there: Floats, blocks: Blocks) -> Ints:
-    """Return, for each wedge, the corner nearest to its place among those that became it, as a slot."""
-    squared = _squared(points, faces.ravel(), target.ravel(), there, blocks)
-    best = np.full(there.shape[1], np.inf, np.float32)
-    np.minimum.at(best, target.ravel(), squared)
-    won = np.flatnonzero(squared <= best.take(target.ravel()))[::-1]
-    corner = np.zeros(there.shape[1], np.int64)
-    corner[target.ravel().take(won)] = won  # of equals the first
-    return corner
+def numbered(keys: Ints, bound: int) -> tuple[Ints, Ints]:
+    """Return what `np.unique` does with the inverse, of whole numbers below a bound; without sorting if few."""
+    if bound > 8 * len(keys) + 1024:
+        names, number = np.unique(keys, return_inverse=True)
+        return names, number.ravel()
+    there = np.zeros(bound, bool)
+    there[keys] = True
+    return np.flatnonzero(there), (np.cumsum(there) - 1).take(keys)
 
 
-def _squared(points: Floats, vertices: Ints, target: Ints, there: Floats, blocks: Blocks) -> np.ndarray:
-    squared = np.empty(len(vertices), np.float32)
+def _nearest_corners(ground: Ground, number: Ints, there: Floats) -> tuple[Ints, Floats]:
+    """Return, for each of a level's wedges, the nearest corner that became it, as a slot, and how far that is."""
+    offset = ground.places - there.take(number, axis=1)
+    far = np.sqrt(_square(offset))
+    reach = np.full(there.shape[1], np.inf)
+    np.minimum.at(reach, number, far)
+    won = np.flatnonzero(far <= reach.take(number))
+    corner = np.full(there.shape[1], ground.lines.faces.size)
+    np.minimum.at(corner, number.take(won), ground.slot.take(won))  # of equals the first
+    return corner, reach
 
-    def measure(part: slice) -> None:
-        offset = points.take(vertices[part], axis=1) - there.take(target[part], axis=1)
-        squared[part] = (offset * offset).sum(axis=0)
 
-    blocks.map(measure, len(vertices), _BLOCK)
-    return squared
-
-
-def _closest(points: Floats, faces: Ints, target: Ints, there: Floats, corner: Ints, moved: Ints,
-             blocks: Blocks) -> tuple[Ints, Floats]:
+def _closest(ground: Ground, target: Ints, there: Floats, reach: Floats, moved: Ints) -> tuple[Ints, Floats]:
     """Return the closest faces, among those with a corner in the wedge, of the wedges `moved`, and weights in them."""
-    offset = points.take(faces.ravel().take(corner), axis=1) - there
-    reach = np.sqrt((offset * offset).sum(axis=0))
-    reach[np.setdiff1d(np.arange(len(reach)), moved, assume_unique=True)] = -np.inf
+    blocks = Blocks()
+    limit = np.where(reach > 0, reach * (1 + 1e-9), -np.inf)  # what has not moved is where it was
 
     def near(part: slice) -> tuple[Ints, Ints]:
         """Find the faces that may come closer than the nearest corner."""
-        a, b, c = (points.take(row, axis=1) for row in faces[:, part])
-        middle = (a + b + c) / 3
-        radius = np.sqrt(np.maximum(np.maximum(_square(a - middle), _square(b - middle)), _square(c - middle)))
+        middle, radius = ground.spheres[:3, part], ground.spheres[3, part]
         found = []
         for side in range(3):
             own = target[side, part]
-            new = _square(middle - there.take(own, axis=1)) <= (reach.take(own) * (1 + 1e-9) + radius) ** 2
-            new &= reach.take(own) >= 0
+            within = limit.take(own) + radius
+            new = (_square(middle - there.take(own, axis=1)) <= within * within) & (within > 0)
             for before in range(side):
                 new &= target[before, part] != own
             chosen = np.flatnonzero(new)
             found.append((chosen + part.start, own.take(chosen)))
         return tuple(np.concatenate(rows) for rows in zip(*found, strict=True))
 
-    near_faces, wedges = (np.concatenate(rows) for rows in
-                          zip(*blocks.map(near, faces.shape[1], _BLOCK), strict=True))
-    used, number = np.unique(near_faces, return_inverse=True)
-    frames = triangle_frames(points.T, np.ascontiguousarray(faces.take(used, axis=1).T))
-    squared = np.empty(len(wedges))
+    faces, wedges = (np.concatenate(rows) for rows in zip(*blocks.map(near, target.shape[1], _BLOCK), strict=True))
+    frames, squared = ground.frames(faces), np.empty(len(faces))
 
     def measure(part: slice) -> None:
-        squared[part] = closest_in_triangles(frames.take(number[part], axis=1), there.take(wedges[part], axis=1))[1]
+        squared[part] = squared_distances(frames.take(faces[part], axis=1), there.take(wedges[part], axis=1))
 
     blocks.map(measure, len(wedges), _BLOCK // 4)
     best = np.full(there.shape[1], np.inf)
@@ -160,10 +188,9 @@ def _closest(points: Floats, faces: Ints, target: Ints, there: Floats, corner: I
     won = np.flatnonzero(squared <= best.take(wedges))[::-1]
     chosen = np.zeros(there.shape[1], np.int64)
     chosen[wedges.take(won)] = won
-    chosen = chosen.take(moved)
-    face = near_faces.take(chosen)
-    place = closest_in_triangles(frames.take(number.take(chosen), axis=1), there.take(moved, axis=1))[0]
-    return face, _barycentric(points, faces.take(face, axis=1), place)
+    face = faces.take(chosen.take(moved))
+    place = closest_in_triangles(frames.take(face, axis=1), there.take(moved, axis=1))[0]
+    return face, _barycentric(ground.points, ground.lines.faces.take(face, axis=1), place)
 
 
 def _square(vectors: Floats) -> Floats:
