@@ -27,6 +27,11 @@ class Polygons(NamedTuple):
     source: Ints
 
 
+def triangles_alone(polygon: Ints) -> Polygons:
+    """Give triangles as they are; `polygon` is the source's polygon of each, (m,) int64."""
+    return Polygons(np.arange(len(polygon)) * 3, np.arange(len(polygon) * 3), polygon)
+
+
 def polygons_again(faces: Ints, moved: NDArray[np.bool_], corner: Ints, polygon: Ints, sizes: Ints, *,
                    join: bool) -> Polygons:
     """Put triangles together to the polygons that they come from.

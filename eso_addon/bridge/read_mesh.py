@@ -29,6 +29,7 @@ class MeshArrays:
     triangle_polygon: NDArray[np.int64]  # (m,)
     polygon_sizes: NDArray[np.int64]  # (p,) corners of each polygon
     edges: NDArray[np.int64]  # (e, 2) vertex indices
+    wires: NDArray[np.int64]  # edges of no face
     material_index: NDArray[np.int32]  # (m,)
     smooth: NDArray[np.bool_]  # (m,)
     transform: NDArray[np.float64]  # (4, 4), object space to the space of `vertices`
@@ -225,6 +226,7 @@ def _arrays_of(obj: bpy.types.Object, mesh: bpy.types.Mesh, transform: NDArray[n
         triangle_polygon=polygon.astype(np.int64),
         polygon_sizes=sizes,
         edges=np.zeros((0, 2), np.int64) if edges is None else edges.astype(np.int64),
+        wires=_wires(mesh),
         material_index=material[polygon],
         smooth=~sharp[polygon],
         transform=transform,
@@ -270,6 +272,13 @@ def _triangulated(mesh: bpy.types.Mesh) -> tuple[NDArray[np.int32], NDArray[np.i
     polygon = np.zeros(len(mesh.loop_triangles), np.int32)
     mesh.loop_triangle_polygons.foreach_get("value", polygon)
     return corners, polygon
+
+
+def _wires(mesh: bpy.types.Mesh) -> NDArray[np.int64]:
+    """List the edges of no face."""
+    alone = np.ones(len(mesh.edges), bool)
+    alone[_read_or(mesh, ".corner_edge", 0, np.int32)] = False
+    return np.flatnonzero(alone)
 
 
 def _read_or(mesh: bpy.types.Mesh, name: str, count: int, dtype: type) -> NDArray:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..core.mesh import MeshError
 from .attributes import read_attribute, write_attribute
 from .layers import Layer, write_layer
-from .polygons import Polygons, polygons_again
+from .polygons import Polygons, polygons_again, triangles_alone
 from .read_mesh import GROUPS, KEYS, NORMALS, MeshArrays
 from .shape_keys import write_keys
 from .vertex_groups import limited, write_groups
@@ -99,19 +99,16 @@ def _loose(result: Simplified, source: MeshArrays) -> _Loose:
     used = np.zeros(len(source.vertices), bool)
     used[source.triangles] = True
     vertices = np.flatnonzero(~used)
-    corner_sides = np.sort(np.stack((source.triangles, np.roll(source.triangles, -1, axis=1)), axis=-1).reshape(-1, 2))
-    count = max(len(used), 1)
-    sides = np.unique(corner_sides[:, 0] * count + corner_sides[:, 1])
-    pairs = np.sort(source.edges, axis=1)
-    wires = np.flatnonzero(~np.isin(pairs[:, 0] * count + pairs[:, 1], sides))
+    if not len(vertices) and not len(source.wires):
+        return _Loose.none()
     number = np.full(len(used), -1)
     vertex_map = getattr(result, "vertex_map", None)
     if vertex_map is not None:
         number[:] = vertex_map
     number[vertices] = len(result.vertices) + np.arange(len(vertices))
-    edges = number.take(source.edges.take(wires, axis=0))
+    edges = number.take(source.edges.take(source.wires, axis=0))
     there = np.flatnonzero((edges >= 0).all(axis=1) & (edges[:, 0] != edges[:, 1]))
-    return _Loose(vertices, edges.take(there, axis=0).astype(np.int32), wires.take(there))
+    return _Loose(vertices, edges.take(there, axis=0).astype(np.int32), source.wires.take(there))
 
 
 def _empty_like(source: MeshArrays, name: str) -> bpy.types.Mesh:
@@ -140,6 +137,8 @@ def _object_of(mesh: bpy.types.Mesh) -> Iterator[bpy.types.Object]:
 
 
 def _polygons(result: Simplified, source: MeshArrays, *, join: bool) -> Polygons:
+    if source.polygon_sizes.max(initial=3) <= 3:
+        return triangles_alone(source.triangle_polygon[result.face_map])
     faces = np.asarray(result.faces, np.int64).reshape(-1, 3)
     before = source.vertices[source.triangles[result.face_map]]
     moved = (result.vertices[faces] != before).any(axis=(1, 2))
@@ -149,7 +148,9 @@ def _polygons(result: Simplified, source: MeshArrays, *, join: bool) -> Polygons
 
 def _has_twins(faces: NDArray[np.int32]) -> bool:
     """Tell whether faces share all three vertices; looking is ten times as quick as Blender's validation."""
-    low, middle, high = np.sort(faces, axis=1).astype(np.uint64).T
+    a, b, c = faces.T.astype(np.uint64)
+    low, high = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
+    middle = a + b + c - low - high
     keys = np.sort((low * np.uint64(0x9E3779B97F4A7C15) + middle) * np.uint64(0xC2B2AE3D27D4EB4F) + high)
     return bool((keys[1:] == keys[:-1]).any())  # or one in a billion others
 

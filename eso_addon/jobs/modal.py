@@ -20,12 +20,16 @@ _VIEW_EVENTS = {"MIDDLEMOUSE", "WHEELUPMOUSE", "WHEELDOWNMOUSE", "MOUSEMOVE", "T
 class EngineOperator:
     """An operator in three parts: read arrays in `prepare`, let the engine run, write once in `finish`."""
 
-    seconds: float
     _worker: Worker[Any]
     _timer: Any
     _start: float
     _stop_time: float
     _show_time: float = 0.0
+
+    @property
+    def seconds(self) -> float:
+        """How long it has taken so far."""
+        return time.perf_counter() - self._start
 
     def prepare(self, context: bpy.types.Context) -> Steps[Any]:
         """Read Blender's data and return the engine's generator, which touches arrays only."""
@@ -88,7 +92,6 @@ class EngineOperator:
         return self._worker.is_stopped and time.perf_counter() - self._stop_time > GRACE_SECONDS
 
     def _finished(self, context: bpy.types.Context, result: Any) -> set[str]:  # noqa: ANN401
-        self.seconds = time.perf_counter() - self._start
         self.finish(context, result)
         return {"FINISHED"}
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Generator
 from dataclasses import fields, is_dataclass, replace
-from hashlib import sha256
 from typing import TYPE_CHECKING, Any
 
 from ..core.steps import scaled
@@ -14,7 +13,7 @@ if TYPE_CHECKING:
     from ..core.levels import SimplifyResult
     from ..core.recording import Recording
 
-_kept: dict[str, Recording] = {}
+_kept: list[tuple[Any, Recording]] = []  # what was asked for, and the run
 
 
 def replayed_steps(
@@ -55,13 +54,13 @@ def replayed_steps(
         *(targets.get(name) for name in ("ratios", "faces_targets", "max_errors")),
         needed=chosen.method != "feature",
     )
-    key = fingerprint(original, replace(chosen, refit=False, threads=None))  # neither changes the run
-    recording = _kept.get(key)
+    asked = original, replace(chosen, refit=False, threads=None)  # neither changes the run
+    recording = next((run for earlier, run in _kept if same(earlier, asked)), None)
     replayed = recording is not None
     if recording is None:
         recording = yield from scaled(recording_steps(original, chosen, 0), lambda part: 0.8 * part)
         forget()
-        _kept[key] = recording
+        _kept.append((asked, recording))
     levels = yield from scaled(
         recording.levels_steps(counts, errors, refit=chosen.refit), lambda part: 0.8 + 0.2 * part
     )
@@ -70,7 +69,7 @@ def replayed_steps(
 
 def kept() -> Recording | None:
     """Give the run that is kept, None if there is none."""
-    return next(iter(_kept.values()), None)
+    return _kept[-1][1] if _kept else None
 
 
 def forget() -> None:
@@ -78,37 +77,27 @@ def forget() -> None:
     _kept.clear()
 
 
-def fingerprint(*values: Any) -> str:  # noqa: ANN401
-    """Hash arrays, plain values, and anything made of them.
+def same(one: Any, other: Any) -> bool:  # noqa: ANN401
+    """Tell whether two things have equal content: arrays to the last bit, plain values, and anything made of them.
 
     Parameters
     ----------
-    *values
+    one, other
         Arrays, numbers, texts, None; dictionaries, tuples, lists and dataclasses of such.
-
-    Returns
-    -------
-    str
-        Equal for equal content alone.
     """
-    digest = sha256()
-    _feed(digest, values)
-    return digest.hexdigest()
+    if type(one) is not type(other):
+        return False
+    if hasattr(one, "dtype"):
+        return bool(one.dtype == other.dtype and one.shape == other.shape and (_bits(one) == _bits(other)).all())
+    if is_dataclass(one):
+        return all(same(getattr(one, field.name), getattr(other, field.name)) for field in fields(one))
+    if isinstance(one, dict):
+        return list(one) == list(other) and all(map(same, one.values(), other.values()))
+    if isinstance(one, (tuple, list)):
+        return len(one) == len(other) and all(map(same, one, other))
+    return bool(one == other)
 
 
-def _feed(digest: Any, value: Any) -> None:  # noqa: ANN401
-    if hasattr(value, "dtype") and hasattr(value, "tobytes"):
-        digest.update(f"{value.dtype.str}{value.shape}".encode())
-        digest.update(memoryview(value).cast("B") if value.flags.c_contiguous and value.size else value.tobytes())
-    elif isinstance(value, dict):
-        _feed(digest, sorted(value.items()))
-    elif is_dataclass(value):
-        _feed(digest, {field.name: getattr(value, field.name) for field in fields(value)})
-    elif isinstance(value, (tuple, list)):
-        digest.update(f"({len(value)}".encode())
-        for item in value:
-            _feed(digest, item)
-    else:
-        digest.update(f"{type(value).__name__}:{value!r};".encode())
-
-
+def _bits(array: Any) -> Any:  # noqa: ANN401
+    """Give an array whose values are equal where its bits are: a float may be no number."""
+    return array.view(f"i{array.itemsize}") if array.dtype.kind == "f" and array.itemsize in (2, 4, 8) else array
