@@ -7,28 +7,55 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..core.adjacency import sorting_order
 from ..core.mesh import Bools, Ints
 from .coder import Reader, Writer
 from .errors import StreamError
 from .fans import Fans, fans_at
 from .geometry import Grid, Shape, code_positions, place_of
 from .models import Model
-from .splits import openings, walk
+from .splits import Arcs, openings, walk
 
 _ESCAPE = 15
 
 
-@dataclass
 class Mesh:
-    """The mesh on its way up; arrays have room for the whole."""
+    """The mesh on its way up; arrays have room for the whole, their rows side by side.
 
-    grid: Grid
-    numbers: Ints  # (n, 3), coordinates as they are written
-    points: Ints  # (n, 3), on the grid of predictions
-    faces: Ints  # (3, m)
-    parents: Ints  # (n,) the vertex that each was split from, -1 in the base
-    vertex_count: int
-    face_count: int
+    Attributes
+    ----------
+    numbers, points : ndarray, (3, n) int64
+        Coordinates as they are written, and on the grid of predictions.
+    short : ndarray, (3, n) int64
+        Points without the bits that scores do not look at.
+    faces : ndarray, (3, m) int64
+    parents : ndarray, (n,) int64
+        The vertex that each was split from, -1 in the base.
+    degree : ndarray, (n,) int64
+        Corners at each vertex.
+    vertex_count, face_count : int
+        How many of them are there.
+    """
+
+    def __init__(self, grid: Grid, vertices: int, faces: int) -> None:
+        self.grid = grid
+        self.numbers = np.zeros((3, vertices), np.int64)
+        self.points = self.numbers if grid.kind != 2 else np.zeros((3, vertices), np.int64)
+        self.short = self.points if grid.shift == 0 else np.zeros((3, vertices), np.int64)
+        self.faces = np.zeros((3, faces), np.int64)
+        self.parents = np.full(vertices, -1)
+        self.degree = np.zeros(vertices, np.int64)
+        self.vertex_count = self.face_count = 0
+
+    def place(self, numbers: Ints) -> None:
+        """Add vertices at (3, k) numbers."""
+        new = slice(self.vertex_count, self.vertex_count + numbers.shape[1])
+        self.numbers[:, new] = numbers
+        if self.points is not self.numbers:
+            self.points[:, new] = self.grid.predictors(numbers)
+        if self.short is not self.points:
+            self.short[:, new] = self.points[:, new] >> self.grid.shift
+        self.vertex_count = new.stop
 
 
 @dataclass(frozen=True)
@@ -44,7 +71,7 @@ class Splits:
     length : ndarray
     third : ndarray, (2, k)
         Third corners of the new faces, -1 where there is none.
-    numbers : ndarray, (k, 3)
+    numbers : ndarray, (3, k)
     """
 
     vertex: Ints
@@ -78,25 +105,23 @@ class Connectivity:
 def code_batch(coder: Writer | Reader, models: Connectivity, shape: Shape, mesh: Mesh, known: Splits | None) -> Done:
     """Write a batch, or read it, and carry it out on the mesh."""
     count = mesh.vertex_count
-    faces = mesh.faces[:, : mesh.face_count]
     vertex = _code_flags(coder, models, mesh, known)
+    splits = len(vertex)
     chosen = np.zeros(count, bool)
     chosen[vertex] = True
-    fans = fans_at(faces, chosen)
-    splits = len(vertex)
-    label = np.full(count, -1)
+    label = np.zeros(count, np.int64)
     label[vertex] = np.arange(splits)
-    own = label.take(fans.vertex)
-    degree = np.bincount(own, minlength=splits)
+    fans = fans_at(mesh.faces[:, : mesh.face_count], chosen)
+    degree = mesh.degree.take(vertex)
     length = _code_small(coder, models.length, np.minimum(degree, 15), None if known is None else known.length)
-    start = _code_start(coder, models.start, mesh, fans, own, degree, vertex, length, known)
-    there = _code_sides(coder, models.sides, fans, start, length, known)
-    arcs = walk(fans, start, length, there[0])
+    start = _code_start(coder, models.start, mesh, fans, label.take(fans.vertex), degree, vertex, length, known)
+    arcs = walk(fans, start, length)
+    there = _code_sides(coder, models.sides, fans, start, length, arcs, known)
     new = count + np.arange(splits)
     slot = fans.slot.take(arcs.corner)
-    moved = faces.copy()
-    moved.ravel()[slot] = new.take(arcs.split)
-    found = openings(fans, arcs, vertex, start, there, moved, count)
+    row, face = np.divmod(slot, max(mesh.face_count, 1))
+    mesh.faces[row, face] = new.take(arcs.split)
+    found = openings(fans, arcs, chosen, vertex, start, there, mesh.faces[:, : mesh.face_count])
     third = found.third
     at, partner = found.torn_at, found.partner
     if len(at):
@@ -106,22 +131,21 @@ def code_batch(coder: Writer | Reader, models: Connectivity, shape: Shape, mesh:
             diagonal = found.upper_of(known.third.ravel().take(at) >= count)
         diagonal[first] = coder.symbols(models.torn, first * 0, diagonal.take(first).astype(np.int64)) == 1
         diagonal = diagonal.take(np.minimum(partner, np.arange(len(at))))
-        ring = label.take(third.ravel().take(at))
-        third.ravel()[at] = np.where(found.upper_of(diagonal), new.take(ring), third.ravel().take(at))
-    numbers = code_positions(coder, shape, mesh.grid, mesh.points[:count], fans, arcs, vertex,
+        ring = third.ravel().take(at)
+        third.ravel()[at] = np.where(found.upper_of(diagonal), new.take(label.take(ring)), ring)
+    numbers = code_positions(coder, shape, mesh.grid, mesh.points, fans, arcs, vertex,
                              None if known is None else known.numbers)
-    _carry_out(mesh, moved, vertex, there, third, numbers)
+    _carry_out(mesh, vertex, arcs, there, third, numbers)
     return Done(arcs.split, slot, fans.slot.take(start), there)
 
 
 def _code_flags(coder: Writer | Reader, models: Connectivity, mesh: Mesh, known: Splits | None) -> Ints:
-    count = mesh.vertex_count
-    degree = np.bincount(mesh.faces[:, : mesh.face_count].ravel(), minlength=count)
+    degree = mesh.degree[: mesh.vertex_count]
     able = np.flatnonzero(degree)
     context = np.minimum(degree.take(able), 20)
     flags = None
     if known is not None:
-        marked = np.zeros(count, np.int64)
+        marked = np.zeros(mesh.vertex_count, np.int64)
         marked[known.vertex] = 1
         flags = marked.take(able)
     return able.take(np.flatnonzero(coder.symbols(models.flag, context, flags)))
@@ -142,15 +166,15 @@ def _code_small(coder: Writer | Reader, model: Model, context: Ints, known: Ints
 def _code_start(coder: Writer | Reader, model: Model, mesh: Mesh, fans: Fans, own: Ints, degree: Ints, vertex: Ints,
                 length: Ints, known: Splits | None) -> Ints:
     """Code at which corner each arc starts, as its place in an order by likelihood."""
-    points, shift = mesh.points[: mesh.vertex_count], mesh.grid.shift
     corners, splits = len(own), len(vertex)
-    short = [points[:, axis] >> shift for axis in range(3)]
     toward = np.zeros(corners, np.int64)
-    for axis in range(3):
-        center = short[axis].take(vertex)
-        off = short[axis].take(fans.following) + short[axis].take(fans.preceding) - 2 * center.take(own)
+    for axis in mesh.short:
+        off = axis.take(fans.following)
+        off += axis.take(fans.preceding)
+        off -= (2 * axis.take(vertex)).take(own)
         pull = np.bincount(own, off, splits).astype(np.int64)
-        toward += (pull // np.maximum(degree, 1)).take(own) * off
+        off *= (pull // degree).take(own)
+        toward += off
     window = toward.copy()
     current, step = np.arange(corners), 1
     steps = np.minimum(length, 8).take(own)
@@ -162,8 +186,9 @@ def _code_start(coder: Writer | Reader, model: Model, mesh: Mesh, fans: Fans, ow
         window[left] += toward.take(onward)
         step += 1
         left = left[steps.take(left) > step]
-    # one key sorts by split, then by likelihood in single precision; equal ones keep the order of the corners' slots
-    order = np.argsort((own << 32) + place_of(-window), kind="stable")
+    # by likelihood in single precision, equal ones in the order of the corners' slots; then by split
+    order = sorting_order(place_of(-window) + (1 << 31))
+    order = order.take(sorting_order(own.take(order)))
     begin = np.cumsum(degree) - degree
     rank = None
     context = np.minimum(degree, 15) * 8 + np.minimum(length, 7)
@@ -179,24 +204,15 @@ def _code_start(coder: Writer | Reader, model: Model, mesh: Mesh, fans: Fans, ow
     return order.take(begin + rank) if corners else np.zeros(0, np.int64)
 
 
-def _code_sides(coder: Writer | Reader, model: Model, fans: Fans, start: Ints, length: Ints,
+def _code_sides(coder: Writer | Reader, model: Model, fans: Fans, start: Ints, length: Ints, arcs: Arcs,
                 known: Splits | None) -> Bools:
     """Code which of the two new faces are there; at both inside a surface, so only the fans' ends need symbols."""
     there = np.ones((2, len(start)), bool)
-    last = start.copy()
-    step = 1
-    left = np.flatnonzero(length > 1)
-    while len(left):
-        onward = fans.successor.take(last.take(left))
-        if onward.min() < 0 or step > len(fans.slot):
-            raise StreamError("the stream is damaged: a split leaves the surface; fetch the file again")
-        last[left] = onward
-        step += 1
-        left = left[length.take(left) > step]
     at_first = fans.predecessor.take(start) < 0
-    at_last = fans.successor.take(last) < 0
-    asked = np.flatnonzero(at_first | at_last | (length == 0))
-    context = np.where(length.take(asked) == 0, 2, (at_first & at_last).take(asked).astype(np.int64))
+    at_last = fans.successor.take(arcs.last) < 0
+    bare = length == 0
+    asked = np.flatnonzero(at_first | at_last | bare)
+    context = np.where(bare.take(asked), 2, (at_first & at_last).take(asked).astype(np.int64))
     symbol = None
     if known is not None:
         symbol = (known.third.take(asked, axis=1) >= 0).astype(np.int64)
@@ -205,24 +221,27 @@ def _code_sides(coder: Writer | Reader, model: Model, fans: Fans, start: Ints, l
     there[0, asked], there[1, asked] = symbol & 1, symbol >> 1
     if not there.any(axis=0).all():
         raise StreamError("the stream is damaged: a split opens no face; fetch the file again")
+    arcs.settle(np.flatnonzero(bare), there[0])
     return there
 
 
-def _carry_out(mesh: Mesh, moved: Ints, vertex: Ints, there: Bools, third: Ints, numbers: Ints) -> None:
+def _carry_out(mesh: Mesh, vertex: Ints, arcs: Arcs, there: Bools, third: Ints, numbers: Ints) -> None:
     count, splits = mesh.vertex_count, len(vertex)
     new = count + np.arange(splits)
-    opened = int(there.sum())
-    if count + splits > len(mesh.points) or mesh.face_count + opened > mesh.faces.shape[1]:
-        raise StreamError("the stream is damaged: a batch holds more than its table says; fetch the file again")
-    mesh.faces[:, : mesh.face_count] = moved
     both = there.sum(axis=0)
+    opened = int(both.sum())
+    if count + splits > mesh.numbers.shape[1] or mesh.face_count + opened > mesh.faces.shape[1]:
+        raise StreamError("the stream is damaged: a batch holds more than its table says; fetch the file again")
     place = mesh.face_count + np.cumsum(both) - both
     for which, (first, second) in enumerate(((new, vertex), (vertex, new))):
-        own = there[which]
-        at = (place + (which == 1) * there[0])[own]
-        mesh.faces[:, at] = np.stack((first[own], second[own], third[which][own]))
-    mesh.numbers[count : count + splits] = numbers
-    mesh.points[count : count + splits] = mesh.grid.predictors(numbers)
-    mesh.parents[count : count + splits] = vertex
-    mesh.vertex_count += splits
+        own = np.flatnonzero(there[which])
+        at = place.take(own) + (which == 1) * there[0].take(own)
+        for row, corners in zip(mesh.faces, (first, second, third[which]), strict=True):
+            row[at] = corners.take(own)
+    moved = np.bincount(arcs.split, minlength=splits)
+    mesh.degree[new] = both + moved
+    mesh.degree[vertex] += both - moved
+    mesh.degree[: count + splits] += np.bincount(third.ravel()[there.ravel()], minlength=count + splits)
+    mesh.parents[new] = vertex
+    mesh.place(numbers)
     mesh.face_count += opened

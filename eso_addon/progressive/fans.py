@@ -62,7 +62,7 @@ def _match(own: Ints, wanted: Ints) -> tuple[Ints, Ints]:
     if count == 0:
         return np.zeros(0, np.int64), np.zeros(0, np.int64)
     bits = max((4 * count).bit_length(), 4)
-    table = np.full(1 << bits, -1)
+    table = np.zeros(1 << bits, np.int64)  # where nothing is written is a key that does not fit
     numbers = np.arange(count)
     home = _hash(own, bits)
     table[home] = numbers
@@ -70,7 +70,7 @@ def _match(own: Ints, wanted: Ints) -> tuple[Ints, Ints]:
     hidden = np.flatnonzero(winner != numbers)  # another key has their place: these few are sorted
     repeated = hidden[own.take(hidden) == own.take(winner.take(hidden))]
     found = table.take(_hash(wanted, bits))
-    found[(found >= 0) & (own.take(found) != wanted)] = -1
+    found[own.take(found) != wanted] = -1
     if len(hidden):
         hidden = hidden[np.argsort(own.take(hidden), kind="stable")]
         keys = own.take(hidden)

@@ -78,67 +78,76 @@ class Shape:
         self.models = [Model(CLASSES, CLASSES, shared=True) for _ in range(3)]
 
 
-def ring_sums(points: Ints, fans: Fans, arcs: Arcs, vertex: Ints) -> tuple[Ints, Ints]:
-    """Return for each split the sum over its new vertex's ring, (3, k), and the ring's size, (k,)."""
-    count = len(vertex)
-    ring = fans.preceding.take(arcs.corner)
-    size = np.bincount(arcs.split, minlength=count) + 2
-    total = points.take(vertex, axis=0).T + points.take(arcs.first_ring, axis=0).T
-    for axis in range(3):
-        total[axis] += np.bincount(arcs.split, points[:, axis].take(ring), count).astype(np.int64)
-    return total, size
-
-
 def arc_normals(points: Ints, fans: Fans, arcs: Arcs, vertex: Ints, shift: int) -> Ints:
     """Return the sum of the normals of each split's arc, scaled to below 2 to the 12th: (3, k) int64."""
-    center = points.take(vertex, axis=0).take(arcs.split, axis=0)
-    p = ((points.take(fans.following.take(arcs.corner), axis=0) - center) >> shift).T
-    q = ((points.take(fans.preceding.take(arcs.corner), axis=0) - center) >> shift).T
+    following, preceding = fans.following.take(arcs.corner), fans.preceding.take(arcs.corner)
+    p, q = np.empty((3, len(arcs.corner)), np.int64), np.empty((3, len(arcs.corner)), np.int64)
+    for axis, row in enumerate(points):
+        center = row.take(vertex).take(arcs.split)
+        np.right_shift(row.take(following) - center, shift, out=p[axis])
+        np.right_shift(row.take(preceding) - center, shift, out=q[axis])
     normal = np.empty((3, len(vertex)), np.int64)
     for axis in range(3):
         j, k = (axis + 1) % 3, (axis + 2) % 3
-        part = p[j] * q[k] - p[k] * q[j]
-        normal[axis] = np.bincount(arcs.split, part, len(vertex))
+        normal[axis] = np.bincount(arcs.split, p[j] * q[k] - p[k] * q[j], len(vertex))
     length = np.abs(normal).max(axis=0, initial=0)
     excess = np.maximum(np.frexp(length.astype(np.float64))[1].astype(np.int64) - 12, 0)
     return normal >> excess
 
 
+def ring_means(points: Ints, fans: Fans, arcs: Arcs, vertex: Ints) -> tuple[Ints, Ints, Ints]:
+    """Return the vertices that split and the means over the new ones' rings, (3, k), and how far these spread, (k,)."""
+    count = len(vertex)
+    ring = fans.preceding.take(arcs.corner)
+    size = np.bincount(arcs.split, minlength=count) + 2
+    center, mean = np.empty((3, count), np.int64), np.empty((3, count), np.int64)
+    spread = np.zeros(count, np.int64)
+    for axis, row in enumerate(points):
+        around, first = row.take(ring), row.take(arcs.first_ring)
+        center[axis] = row.take(vertex)
+        total = center[axis] + first
+        total += np.bincount(arcs.split, around, count).astype(np.int64)
+        total *= 2
+        total += size
+        mean[axis] = total // (2 * size)
+        around -= mean[axis].take(arcs.split)
+        spread += np.bincount(arcs.split, np.abs(around), count).astype(np.int64)
+        spread += np.abs(center[axis] - mean[axis]) + np.abs(first - mean[axis])
+    return center, mean, spread // size
+
+
 def code_positions(coder: Writer | Reader, shape: Shape, grid: Grid, points: Ints, fans: Fans, arcs: Arcs,
                    vertex: Ints, known: Ints | None) -> Ints:
-    """Write or read the numbers of the new vertices' coordinates: (k, 3) int64.
+    """Write or read the numbers of the new vertices' coordinates: (3, k) int64.
 
     The two coordinates across the surface's normal come first, against the mean of the ring; the one along it last,
     against the plane of the arc through the old vertex, where the first two put it.
+
+    Parameters
+    ----------
+    points : ndarray, (3, n) int64
+        On the grid of predictions.
+    known : ndarray, (3, k) int64, or None
     """
-    total, size = ring_sums(points, fans, arcs, vertex)
-    mean = (2 * total + size) // (2 * size)
+    center, mean, spread = ring_means(points, fans, arcs, vertex)
     normal = arc_normals(points, fans, arcs, vertex, grid.shift)
     axis = np.abs(normal).argmax(axis=0)
     columns = np.arange(len(vertex))
-    ring = fans.preceding.take(arcs.corner)
-    spread = np.zeros(len(vertex), np.int64)
-    for row in range(3):
-        off = np.abs(points[:, row].take(ring) - mean[row].take(arcs.split))
-        spread += np.bincount(arcs.split, off, len(vertex)).astype(np.int64)
-        for end in (vertex, arcs.first_ring):
-            spread += np.abs(points[:, row].take(end) - mean[row])
-    spread = spread // size
-    values = np.zeros((len(vertex), 3), np.int64)
-    moved: list[Ints] = []
+    values = np.zeros((3, len(vertex)), np.int64)
+    lean = np.zeros(len(vertex), np.int64)
     scale = spread
     for step, model in enumerate(shape.models):
         at = (axis + 1 + step) % 3
-        expected = mean[at, columns]
+        expected, here = mean[at, columns], center[at, columns]
         if step == 2:
-            lean = sum(normal[(axis + 1 + i) % 3, columns] * moved[i] for i in range(2))
-            divisor = normal[axis, columns]
-            divisor = np.where(divisor == 0, 1, divisor)
-            expected = points.take(vertex, axis=0)[columns, at] - lean // divisor
-        number, place = _code_one(coder, model, grid, expected, scale, None if known is None else known[columns, at])
-        values[columns, at] = number
-        moved.append(place - points.take(vertex, axis=0)[columns, at])
-        scale = (spread + 3 * np.abs(place - mean[at, columns]) + 1) >> 1
+            divisor = normal[at, columns]
+            divisor[divisor == 0] = 1
+            expected = here - lean // divisor
+        number, place = _code_one(coder, model, grid, expected, scale, None if known is None else known[at, columns])
+        values[at, columns] = number
+        if step < 2:
+            lean += normal[at, columns] * (place - here)
+            scale = (spread + 3 * np.abs(place - expected) + 1) >> 1
     return values
 
 
@@ -176,17 +185,25 @@ def lossless_grid(positions: np.ndarray) -> tuple[Grid, Ints]:
     if len(finite) == len(positions):
         steps = [(1, 10.0**digits) for digits in range(9)]
         steps += [(0, 2.0 ** (exponent - bits)) for bits in (12, 16, 20, 24)]
+        some = slice(None, None, max(len(finite) // 64, 1))
         for kind, scale in steps:
-            count = largest * scale if kind == 1 else largest / scale
-            if count >= 1 << GRID_BITS:
-                continue
-            numbers = np.rint(finite * scale if kind == 1 else finite / scale).astype(np.int64)
             grid = Grid(kind, scale, (0.0, 0.0, 0.0), 0)
-            if np.array_equal(grid.floats(numbers).view(np.uint32), positions.view(np.uint32)):
-                return _shifted(grid, numbers), numbers
+            if _numbers(grid, finite[some], positions[some]) is not None:  # few grids get beyond a sample
+                numbers = _numbers(grid, finite, positions)
+                if numbers is not None:
+                    return _shifted(grid, numbers), numbers
     grid = Grid(2, float(np.ldexp(1.0, GRID_BITS - 1 - exponent)), (0.0, 0.0, 0.0), 0)
     numbers = place_of(positions)
-    return _shifted(grid, grid.predictors(numbers), keep=True), numbers
+    return _shifted(grid, grid.predictors(numbers)), numbers
+
+
+def _numbers(grid: Grid, values: np.ndarray, positions: np.ndarray) -> Ints | None:
+    """Return the numbers of positions on a grid, None where they are not on it or too far out."""
+    scaled = values * grid.scale if grid.kind == 1 else values / grid.scale
+    if np.abs(scaled).max(initial=0.0) >= 1 << GRID_BITS:
+        return None
+    numbers = np.rint(scaled).astype(np.int64)
+    return numbers if np.array_equal(grid.floats(numbers).view(np.uint32), positions.view(np.uint32)) else None
 
 
 def quantised_grid(positions: np.ndarray, bits: int) -> tuple[Grid, Ints]:
@@ -200,7 +217,7 @@ def quantised_grid(positions: np.ndarray, bits: int) -> tuple[Grid, Ints]:
     return _shifted(Grid(0, step, origin, 0), numbers), numbers
 
 
-def _shifted(grid: Grid, predictors: Ints, *, keep: bool = False) -> Grid:
+def _shifted(grid: Grid, predictors: Ints) -> Grid:
     spread = int((predictors.max(axis=0) - predictors.min(axis=0)).max()) if len(predictors) else 0
     return Grid(grid.kind, grid.scale, grid.origin, max(spread.bit_length() - _SHORT_BITS, 0))
 

@@ -57,15 +57,18 @@ class Unwinding:
     """
 
     def __init__(self, points: Floats, faces: Ints, wedges: Ints) -> None:
+        count = len(points)
         self.points = points
-        self.faces = faces
+        self.faces = faces.copy()
         self.wedges = wedges
         self.ids = np.arange(faces.shape[1])
-        self.frozen = np.zeros(len(points), bool)
-        self.held = np.zeros(len(points), bool)
-        self._label = np.full(len(points), -1)
-        self._goes = np.arange(len(points))
-        self._chosen = np.zeros(len(points), bool)
+        self.frozen = np.zeros(count, bool)
+        self.held = np.zeros(count, bool)
+        # the vertex of dead faces is one more than there are
+        self.nowhere = count
+        self._dead = 0
+        self._role = np.full(count + 1, -1)  # of a vertex that goes the number of its collapse k, of its goal -2 - k
+        self._goes = np.arange(count + 1)
 
     def collapse(self, new: Ints, old: Ints) -> tuple[Batch | None, Bools]:
         """Carry out a batch of half-edge collapses; return it, and which of them must wait for the next one.
@@ -77,10 +80,15 @@ class Unwinding:
         late = np.zeros(len(new), bool)
         at = np.flatnonzero(~(self.frozen.take(new) | self.frozen.take(old)))
         self._freeze(np.delete(new, at))
+        near = self._around(np.concatenate((new.take(at), old.take(at))))
+        faces = self.faces.take(near, axis=1)
         while len(at):
-            attempt = self._attempt(new.take(at), old.take(at))
+            attempt = self._attempt(near, faces, new.take(at), old.take(at))
             if not attempt.bad.any():
-                return attempt.accept(), late
+                batch = attempt.accept()
+                if 4 * self._dead > self.faces.shape[1]:
+                    self.pack()
+                return batch, late
             wait = attempt.later()
             late[at[wait]] = True
             alone = attempt.bad & ~attempt.crowded
@@ -89,63 +97,83 @@ class Unwinding:
             at = at[~wait & ~alone]
         return None, late
 
-    def _attempt(self, new: Ints, old: Ints) -> "_Attempt":
-        self._label[new] = np.arange(len(new))
+    def pack(self) -> None:
+        """Leave dead faces out."""
+        alive = np.flatnonzero(self.faces[0] != self.nowhere)
+        self.faces, self.wedges = self.faces.take(alive, axis=1), self.wedges.take(alive, axis=1)
+        self.ids, self._dead = self.ids.take(alive), 0
+
+    def change(self, face: Ints, corners: Ints, dead: int) -> None:
+        """Give faces other corners, so many of them none."""
+        self.faces[:, face] = corners
+        self._dead += dead
+
+    def _attempt(self, near: Ints, faces: Ints, new: Ints, old: Ints) -> "_Attempt":
+        self._role[new] = np.arange(len(new))
+        self._role[old] = -2 - np.arange(len(new))
         self._goes[new] = old
-        self._chosen[old] = True
-        attempt = _Attempt(self, new, old)
-        self._label[new] = -1
+        attempt = _Attempt(self, near, faces, new, old)
+        self._role[new] = self._role[old] = -1
         self._goes[new] = new
-        self._chosen[old] = False
         return attempt
 
+    def _around(self, vertices: Ints) -> Ints:
+        """Return the faces at some vertices."""
+        there = np.zeros(self.nowhere + 1, bool)
+        there[vertices] = True
+        one, two, three = (there.take(row) for row in self.faces)
+        return np.flatnonzero(one | two | three)
+
     def _freeze(self, new: Ints) -> None:
-        if len(new) == 0:
-            return
-        self.frozen[new] = True
-        gone = np.zeros(len(self.points), bool)
-        gone[new] = True
-        around = gone.take(self.faces).any(axis=0)
-        self.frozen[self.faces[:, around]] = True
+        if len(new):
+            self.frozen[new] = True
+            self.frozen[self.faces.take(self._around(new), axis=1)] = True
 
 
 class _Attempt:
-    """One try of a batch, and what is wrong with it."""
+    """One try of a batch, and what is wrong with it.
 
-    def __init__(self, mesh: Unwinding, new: Ints, old: Ints) -> None:
-        self.mesh, self.new, self.old = mesh, new, old
-        count = len(new)
-        label = [mesh._label.take(row) for row in mesh.faces]
-        self.touched = np.flatnonzero(np.maximum(np.maximum(label[0], label[1]), label[2]) >= 0)
-        self.fine = mesh.faces.take(self.touched, axis=1)
-        self.label = np.stack([row.take(self.touched) for row in label])
+    Parameters
+    ----------
+    mesh : Unwinding
+    near : ndarray, (m,) int64
+        The faces around the batch.
+    faces : ndarray, (3, m) int64
+        Their corners.
+    new, old : ndarray, (k,) int64
+    """
+
+    def __init__(self, mesh: Unwinding, near: Ints, faces: Ints, new: Ints, old: Ints) -> None:
+        self.mesh, self.near, self.new, self.old = mesh, near, new, old
+        role = [mesh._role.take(row) for row in faces]
+        self.touched = np.flatnonzero(np.maximum(np.maximum(role[0], role[1]), role[2]) >= 0)
+        self.fine = faces.take(self.touched, axis=1)
+        self.role = np.stack([row.take(self.touched) for row in role])
         self.coarse = mesh._goes.take(self.fine)
         a, b, c = self.coarse
-        dead = (a == b) | (b == c) | (c == a)
-        self._sort_corners(dead, count)
-        alive = np.ones(mesh.faces.shape[1], bool)
-        alive[self.touched[dead]] = False
-        self.kept = np.flatnonzero(alive)
-        whole = mesh.faces.copy()
-        whole[:, self.touched] = self.coarse
-        self.faces = whole.take(self.kept, axis=1)
-        self.place = np.cumsum(alive) - 1
-        self.fans = fans_at(self.faces, mesh._chosen)
-        self.bad = ((self.opened_count > 1).any(axis=0) | ~(self.opened_count > 0).any(axis=0))
+        self.dead = (a == b) | (b == c) | (c == a)
+        self._sort_corners()
+        self.faces = faces.copy()
+        for row, corners in zip(self.faces, self.coarse, strict=True):
+            row[self.touched] = np.where(self.dead, mesh.nowhere, corners)
+        self.fans = fans_at(self.faces, mesh._role < -1)
+        self.bad = (self.opened_count > 1).any(axis=0) | ~(self.opened_count > 0).any(axis=0)
         self.bad |= np.isin(old, self.fans.repeated) if len(self.fans.repeated) else False
         self._find_starts()
-        self._flat_faces(dead)
+        if not self.bad.any():
+            self._flat_faces()
         if not self.bad.any():
             self._check_openings()
 
     def later(self) -> Bools:
         """Find the collapses that must wait: later ones around each that is not clean, and what follows."""
         count = len(self.new)
-        own = np.full(len(self.mesh.points), -1)
-        own[self.old] = np.arange(count)
-        near = np.where(self.label >= 0, self.label, own.take(self.fine))
+        near = np.where(self.role < -1, -2 - self.role, self.role)
+        most = near.max(axis=0)
+        mixed = np.flatnonzero(((near != most) & (near >= 0)).any(axis=0))
+        near, role = near.take(mixed, axis=1), self.role.take(mixed, axis=1)
         one, other = (np.concatenate(parts) for parts in zip(
-            *((near[i], self.label[j]) for i in range(3) for j in range(3) if i != j), strict=True))
+            *((near[i], role[j]) for i in range(3) for j in range(3) if i != j), strict=True))
         met = (one >= 0) & (other >= 0) & (one != other)
         one, other = one[met], other[met]
         first, second = np.minimum(one, other), np.maximum(one, other)
@@ -160,16 +188,17 @@ class _Attempt:
                 return wait
             wait[further] = True
 
-    def _sort_corners(self, dead: Bools, count: int) -> None:
+    def _sort_corners(self) -> None:
         """Tell corners of new vertices that change vertex from those whose face falls."""
+        count = len(self.new)
         self.opened = np.full((2, count), -1)
         self.opened_row = np.zeros((2, count), np.int64)
         self.third = np.full((2, count), -1)
         self.opened_count = np.zeros((2, count), np.int64)
         arcs = []
         for row in range(3):
-            at = np.flatnonzero(self.label[row] >= 0)
-            split = self.label[row].take(at)
+            at = np.flatnonzero(self.role[row] >= 0)
+            split = self.role[row].take(at)
             sides = (self.fine[(row + 1) % 3].take(at), self.fine[(row + 2) % 3].take(at))
             for which in range(2):
                 falls = np.flatnonzero(sides[which] == self.old.take(split))
@@ -178,7 +207,7 @@ class _Attempt:
                 self.opened_row[which, own] = row
                 self.third[which, own] = sides[1 - which].take(falls)
                 self.opened_count[which] += np.bincount(own, minlength=count)
-            stays = np.flatnonzero(~dead.take(at))
+            stays = np.flatnonzero(~self.dead.take(at))
             arcs.append((split.take(stays), self.touched.take(at.take(stays)), np.full(len(stays), row)))
         self.arc_split, self.arc_face, self.arc_row = (np.concatenate(rows) for rows in zip(*arcs, strict=True))
         self.length = np.bincount(self.arc_split, minlength=count)
@@ -186,9 +215,9 @@ class _Attempt:
     def _find_starts(self) -> None:
         """Find where each arc starts, and check that it is one run of corners with clean ends."""
         fans, count, width = self.fans, len(self.new), self.faces.shape[1]
-        place_of = np.full(3 * width, -1)
+        place_of = np.empty(3 * width, np.int64)
         place_of[fans.slot] = np.arange(len(fans.slot))
-        corner = place_of.take(self.arc_row * width + self.place.take(self.arc_face))
+        corner = place_of.take(self.arc_row * width + self.arc_face)
         inside = np.full(len(fans.slot) + 1, -1)
         inside[corner] = self.arc_split
         first = np.flatnonzero(inside.take(fans.predecessor.take(corner)) != self.arc_split)
@@ -208,12 +237,8 @@ class _Attempt:
         wrong |= np.where(there[1, good], third[1] != fans.preceding.take(final), fans.successor.take(final) >= 0)
         self.bad[good[wrong]] = True
         good, final = good[~wrong], final[~wrong]
-        arcs = walk(fans, self.start.take(good), self._steps(good), there[0, good])
+        arcs = walk(fans, self.start.take(good), self.length.take(good))
         self.bad[good[arcs.last != final]] = True
-
-    def _steps(self, good: Ints) -> Ints:
-        """Return the arcs' lengths, cut where the fan ends sooner: such a split is found bad."""
-        return self.length.take(good)
 
     def _find_bare(self) -> None:
         """Find the corner beside which a lone face opens."""
@@ -223,7 +248,7 @@ class _Attempt:
         fans, mesh = self.fans, self.mesh
         there = self.opened[:, bare] >= 0
         self.bad[bare[there.all(axis=0)]] = True
-        index = np.full(len(mesh.points), -1)
+        index = np.full(mesh.nowhere, -1)
         index[self.old[bare]] = np.arange(len(bare))
         own = index.take(fans.vertex)
         third = mesh._goes.take(self.third.take(bare, axis=1))
@@ -235,49 +260,48 @@ class _Attempt:
         self.bad[bare[self.start[bare] < 0]] = True
         self.start[bare[self.bad[bare]]] = 0
 
-    def _flat_faces(self, dead: Bools) -> None:
+    def _flat_faces(self) -> None:
         """Refuse collapses that make a face without area out of one that had some."""
-        alive = np.flatnonzero(~dead)
+        alive = np.flatnonzero(~self.dead)
         doubtful = _no_area(self.mesh.points, self.coarse.take(alive, axis=1))
         if doubtful.any():
             alive = alive[doubtful]
             new = ~_no_area(self.mesh.points, self.fine.take(alive, axis=1))
-            hit = self.label.take(alive[new], axis=1)
+            hit = self.role.take(alive[new], axis=1)
             self.bad[hit[hit >= 0]] = True
 
     def _check_openings(self) -> None:
         """Check that a reader finds the third corners of the new faces."""
-        fans, there = self.fans, self.opened >= 0
-        arcs = walk(fans, self.start, self.length, there[0])
-        faces = self.faces.copy()
-        faces.ravel()[fans.slot.take(arcs.corner)] = self.new.take(arcs.split)
-        found = openings(fans, arcs, self.old, self.start, there, faces, len(self.mesh.points))
-        wrong = there & np.where(found.torn, self.mesh._goes.take(self.third) != found.third,
-                                 self.third != found.third)
+        fans, goes, there = self.fans, self.mesh._goes, self.opened >= 0
+        arcs = walk(fans, self.start, self.length)
+        arcs.settle(np.flatnonzero(self.length == 0), there[0])
+        self.faces.ravel()[fans.slot.take(arcs.corner)] = self.new.take(arcs.split)
+        found = openings(fans, arcs, self.mesh._role < -1, self.old, self.start, there, self.faces)
+        wrong = there & np.where(found.torn, goes.take(self.third) != found.third, self.third != found.third)
         at, other = found.torn_at, found.partner
-        diagonal = found.upper_of(self.third.ravel().take(at) != self.mesh._goes.take(self.third.ravel().take(at)))
+        diagonal = found.upper_of(self.third.ravel().take(at) != goes.take(self.third.ravel().take(at)))
         apart = at[(diagonal != diagonal.take(other)) | (other.take(other) != np.arange(len(at)))]
         wrong.ravel()[apart] = True
         self.bad |= wrong.any(axis=0)
 
     def accept(self) -> Batch:
         """Make the batch the mesh's new state, and return it."""
-        mesh, fans, width = self.mesh, self.fans, self.faces.shape[1]
-        slot = fans.slot.take(self.start)
-        arc_wedge = mesh.wedges.ravel().take(self.arc_row * mesh.faces.shape[1] + self.arc_face)
-        opened_wedge = mesh.wedges.take(self.opened, axis=1, mode="clip")
-        batch = Batch(self.new, self.old, mesh.ids.take(self.kept.take(slot % width)), slot // width, self.length,
-                      np.where(self.opened >= 0, mesh.ids.take(self.opened), -1), self.opened_row,
-                      self.third, opened_wedge)
-        self._merge_wedges(arc_wedge, opened_wedge)
-        mesh.faces, mesh.ids = self.faces, mesh.ids.take(self.kept)
-        mesh.wedges = mesh.wedges.take(self.kept, axis=1)
+        mesh, near, width = self.mesh, self.near, self.faces.shape[1]
+        row, face = np.divmod(self.fans.slot.take(self.start), width)
+        opened = near.take(self.opened, mode="clip")
+        opened_wedge = mesh.wedges.take(opened, axis=1)
+        batch = Batch(self.new, self.old, mesh.ids.take(near.take(face)), row, self.length,
+                      np.where(self.opened >= 0, mesh.ids.take(opened), -1), self.opened_row, self.third, opened_wedge)
+        self._merge_wedges(opened_wedge)
+        mesh.change(near.take(self.touched), np.where(self.dead, mesh.nowhere, self.coarse), int(self.dead.sum()))
         return batch
 
-    def _merge_wedges(self, arc_wedge: Ints, opened_wedge: Ints) -> None:
+    def _merge_wedges(self, opened_wedge: Ints) -> None:
         """Give the arcs' corners the wedge of the old vertex that a fallen face joins to theirs."""
         if not self.mesh.wedges.any():
             return
+        slot = self.arc_row * self.mesh.faces.shape[1] + self.near.take(self.arc_face)
+        arc_wedge = self.mesh.wedges.ravel().take(slot)
         merged, known = np.zeros(len(arc_wedge), np.int64), np.zeros(len(arc_wedge), bool)
         columns = np.arange(len(self.new))
         for same in (True, False):  # first where the wedges meet, then any
@@ -290,7 +314,7 @@ class _Attempt:
                     fits &= at_new == arc_wedge
                 merged[fits] = at_old[fits]
                 known |= fits
-        self.mesh.wedges.ravel()[self.arc_row * self.mesh.faces.shape[1] + self.arc_face] = merged
+        self.mesh.wedges.ravel()[slot] = merged
 
 
 def _no_area(points: Floats, faces: Ints) -> Bools:

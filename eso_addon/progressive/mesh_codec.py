@@ -31,8 +31,7 @@ class _Codec:
         self.header, self.patches, self.reading = header, patches, reading
         self.table_places, self.table_faces = table_places, table_faces
         count, width = int(table_places[-1]), int(table_faces[-1])
-        self.mesh = Mesh(grid, np.zeros((count, 3), np.int64), np.zeros((count, 3), np.int64),
-                         np.zeros((3, width), np.int64), np.full(count, -1), 0, 0)
+        self.mesh = Mesh(grid, count, width)
         self.numbers = numbers
         self.connectivity, self.shape = Connectivity(), Shape()
         self.wedged = "wedges" in header["needs"]
@@ -47,17 +46,17 @@ class _Codec:
         """Code the base: places, faces, faces beside the splits, loose edges, attributes."""
         mesh, patches, known = self.mesh, self.patches, not self.reading
         count, width = int(self.table_places[0]), int(self.table_faces[0])
-        for axis in range(3):
-            column = self.numbers[:count, axis] & 0xFFFFFFFF if known else None
-            values = _running(block, 4, column, count)
-            mesh.numbers[:count, axis] = np.where(values >> 31, values - (1 << 32), values)
-        _check_numbers(mesh.grid, mesh.numbers[:count])
-        mesh.points[:count] = mesh.grid.predictors(mesh.numbers[:count])
+        columns = self.numbers[:, :count] & 0xFFFFFFFF if known else [None] * 3
+        values = np.stack([_running(block, 4, column, count) for column in columns])
+        values = np.where(values >> 31, values - (1 << 32), values)
+        _check_numbers(mesh.grid, values)
+        mesh.place(values)
         faces = np.zeros((3, 0), np.int64)
         if known:
             faces = self.base_faces
         mesh.faces[:, :width] = _code_faces(block, faces if known else None, width, count)
-        mesh.vertex_count, mesh.face_count = count, width
+        mesh.face_count = width
+        mesh.degree[:count] = np.bincount(mesh.faces[:, :width].ravel(), minlength=count)
         extra = self.header["extra"]
         patches.extra = _code_faces(block, patches.extra if known else None, extra, count)
         self._places_wedges(block, 0, count)
@@ -260,7 +259,7 @@ def _code_edges(block: ColumnWriter | ColumnReader, known: Ints | None, count: i
 
 
 def _check_numbers(grid: Grid, numbers: Ints) -> None:
-    if grid.kind != 2 and len(numbers) and int(np.abs(numbers).max()) >= 1 << 27:
+    if grid.kind != 2 and numbers.size and int(np.abs(numbers).max()) >= 1 << 27:
         raise StreamError("the stream is damaged: a coordinate is off its grid; fetch the file again")
 
 
@@ -295,6 +294,7 @@ def encode_mesh(patches: Patches, *, bits: int | None, keep_order: bool, meta: d
         grid, numbers = quantised_grid(patches.places, bits)
         patches = replace(patches, places=grid.floats(numbers))
     patches = replace(patches)
+    numbers = np.ascontiguousarray(numbers.T)
     header = _header(patches, grid, bits, meta)
     codec = _Codec(header, patches.place_starts, patches.face_starts, patches, numbers, grid, False)
     codec.words = {domain: [(name, *as_words(array)) for name, array in patches.attributes.get(domain, {}).items()]
@@ -308,7 +308,7 @@ def encode_mesh(patches: Patches, *, bits: int | None, keep_order: bool, meta: d
     for splits in patches.batches:
         first = codec.mesh.vertex_count
         writer, block = Writer(), ColumnWriter()
-        codec.batch(writer, block, replace(splits, numbers=numbers[first : first + len(splits.vertex)]))
+        codec.batch(writer, block, replace(splits, numbers=numbers[:, first : first + len(splits.vertex)]))
         runs.append(writer.runs)
         parts.append((writer.plain(), block.finish()))
     states, words = rans.encode(runs, header["lanes"])
@@ -388,7 +388,7 @@ def decode_mesh(mesh: EncodedMesh) -> Patches:
     # what is there of a stream that is cut short has no more of these either
     header = {**header, "wedges": min(header["wedges"], limit), "vertices": min(header["vertices"], limit)}
     patches = _empty_patches(header, places, faces, mesh.errors[:given])
-    codec = _Codec(header, places, faces, patches, np.zeros(0, np.int64), _grid(header["grid"]), True)
+    codec = _Codec(header, places, faces, patches, np.zeros((3, 0), np.int64), _grid(header["grid"]), True)
     descriptors = _descriptors(header)
     _prepare_words(codec, descriptors, limit)
     states = 4 * header["lanes"]
@@ -447,7 +447,7 @@ def _read_batch(codec: _Codec, reader: rans.RansReader, data: bytes) -> None:
 
 def _finish(patches: Patches, codec: _Codec, descriptors: list[tuple], given: int) -> None:
     mesh = codec.mesh
-    patches.places = mesh.grid.floats(mesh.numbers[: mesh.vertex_count])
+    patches.places = np.ascontiguousarray(mesh.grid.floats(mesh.numbers[:, : mesh.vertex_count].T))
     patches.parents = mesh.parents[: mesh.vertex_count]
     patches.faces = mesh.faces[:, : mesh.face_count]
     patches.corner_wedge = codec.state_wedge[:, : mesh.face_count]

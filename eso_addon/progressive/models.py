@@ -23,18 +23,18 @@ class Model:
 
     def __init__(self, contexts: int, symbols: int, *, shared: bool = False) -> None:
         self.counts = np.zeros((contexts, symbols), np.int64)
-        self.prior = np.ones((contexts, symbols), np.int64)
         self.shared = np.zeros(contexts + symbols, np.int64) if shared else None
+        self._difference = np.arange(symbols) - np.arange(contexts)[:, None] + contexts
 
     def frequencies(self) -> tuple[Ints, Ints]:
         """Return frequencies, each at least 1, and where each symbol starts: (contexts, symbols) int64."""
         contexts, symbols = self.counts.shape
-        counts = self.counts * _GAIN + self.prior
+        counts = self.counts * _GAIN + 1
         if self.shared is not None:
-            difference = np.arange(symbols) - np.arange(contexts)[:, None] + contexts
-            counts += self.shared.take(difference) * 4 * _GAIN // max(contexts, 1)
+            counts += (self.shared * 4 * _GAIN // contexts).take(self._difference)
         total = counts.sum(axis=1, keepdims=True)
-        frequency = 1 + counts * (SCALE - symbols) // total
+        # in double precision, which is exact here: a quotient below 2 to the 12th of numbers far below 2 to the 53rd
+        frequency = 1 + (counts * (SCALE - symbols) / total).astype(np.int64)
         most = counts.argmax(axis=1)
         rows = np.arange(contexts)
         frequency[rows, most] += SCALE - frequency.sum(axis=1)

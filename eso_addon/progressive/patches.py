@@ -19,9 +19,6 @@ from .polygons import is_apart
 from .source import Source, distinct, rows_as_bytes
 
 _ROUNDS = 12
-# with at least this part of the vertices left, collapses are looked at for one batch until they are that part of
-# what is left: large batches cost few bits, small ones let the cheap collapses go first, as coarse levels need
-_SHARES = ((0.5, 0.25), (0.15, 0.1), (0.0, 0.0))
 
 
 @dataclass
@@ -119,8 +116,7 @@ def make_patches(source: Source, target: int, options: dict[str, Any]) -> Genera
         record = yield from scaled(run, lambda left: min(max((len(source.faces) - left) / total, 0.0), 1.0))
         removed, kept = mesh.source.take(record.removed), mesh.source.take(record.kept)
         costs[removed] = record.cost
-        vertices = int(np.count_nonzero(np.bincount(unwinding.faces.ravel())))
-        batches += _regrouped(unwinding, removed, kept, record.batch_starts, vertices)
+        batches += _carried_out(unwinding, removed, kept, record.batch_starts)
         if int(unwinding.held.sum()) == held:
             break
         unwinding.frozen[:] = False
@@ -130,34 +126,30 @@ def make_patches(source: Source, target: int, options: dict[str, Any]) -> Genera
     return patches
 
 
-def _regrouped(mesh: Unwinding, removed: Ints, kept: Ints, starts: Ints, vertices: int) -> Generator[Batch, None, None]:
-    """Carry out the record's collapses in fewer and larger batches: a batch has one flag a vertex, however many split.
+def _carried_out(mesh: Unwinding, removed: Ints, kept: Ints, starts: Ints) -> Generator[Batch, None, None]:
+    """Carry out the record's batches; what must wait in one of them goes with the next.
 
     Collapses without a common vertex may mostly change places: their splits do not depend on each other.
     """
-    count = len(mesh.points)
     ends = np.append(starts[1:], len(removed))[: len(starts)]
-    total = vertices
-    first = np.full(count, count)
+    first = np.full(len(mesh.points), len(removed))
     waiting = np.zeros(0, np.int64)
     taken = 0
     while taken < len(ends) or len(waiting):
-        share = next(share for least, share in _SHARES if vertices >= least * total)
-        while taken < len(ends) and len(waiting) <= share * vertices:
+        if taken < len(ends):
             waiting = np.concatenate((waiting, np.arange(starts[taken], ends[taken])))
             taken += 1
         one, other = removed.take(waiting), kept.take(waiting)
         place = np.arange(len(waiting))
-        np.minimum.at(first, one, place)
-        np.minimum.at(first, other, place)
+        # of several at a vertex the last one written stays: the first one
+        first[np.stack((one, other), axis=1)[::-1].ravel()] = np.repeat(place[::-1], 2)
         free = (first.take(one) == place) & (first.take(other) == place)
-        first[one], first[other] = count, count
         batch, late = mesh.collapse(one[free], other[free])
         if batch is not None:
             yield batch
-            vertices -= len(batch.new)
         free[np.flatnonzero(free)[late]] = False
         waiting = waiting[~free]
+    mesh.pack()
 
 
 def _corner_columns(turned: np.ndarray | None, width: int) -> Ints:
@@ -249,7 +241,7 @@ class _Numbering:
         self.face[ids] = self.width + np.arange(len(ids))
         self.face_ids.append(ids)
         self.pending = (there, opened)
-        self.splits.append(Splits(old, start, batch.length.take(order), third, np.zeros((0, 3), np.int64)))
+        self.splits.append(Splits(old, start, batch.length.take(order), third, np.zeros((3, 0), np.int64)))
         self._fill_third(batch, order, new, third, there, opened)
         self.parents.append(old)
         self.places += len(new)

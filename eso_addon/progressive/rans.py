@@ -86,36 +86,35 @@ class RansReader:
         context : ndarray, (n,) int64
         frequency, start : ndarray, (contexts, symbols) int64
         """
-        if len(context) == 0:
-            return context
-        used = np.flatnonzero(np.bincount(context, minlength=len(frequency)))
-        row = np.zeros(len(frequency), np.int64)
-        row[used] = np.arange(len(used))
-        widths = frequency.take(used, axis=0).ravel()
-        symbol_of = np.repeat(np.arange(len(widths)), widths)
-        width_of = widths.take(symbol_of)
-        bias_of = (np.arange(len(symbol_of)) & (SCALE - 1)) - start.take(used, axis=0).ravel().take(symbol_of)
-        rows = row.take(context)
-        slots = self._slots(rows << SCALE_BITS, width_of, bias_of)
-        return symbol_of.take(slots) - rows * frequency.shape[1]
+        symbols = np.zeros(len(context), np.int64)
+        lanes, width = len(self._state), frequency.shape[1]
+        # rows of small numbers are gathered and compared many at a time: no table of all slots is worth its making
+        ends = (start + frequency).astype(np.int16)
+        starts, widths = start.ravel(), frequency.ravel()
+        first = context * width
+        for begin in range(0, len(context), lanes):
+            own = context[begin : begin + lanes]
+            state = self._state[: len(own)]
+            slot = state & (SCALE - 1)
+            if width == 2:
+                symbol = (slot >= ends[:, 0].take(own)).view(np.int8)
+            else:
+                symbol = (ends.take(own, axis=0) > slot.astype(np.int16)[:, None]).argmax(axis=1)
+            symbols[begin : begin + lanes] = symbol
+            place = first[begin : begin + lanes] + symbol
+            state >>= SCALE_BITS
+            state *= widths.take(place)
+            state += slot
+            state -= starts.take(place)
+            self._refill(state)
+        return symbols
 
-    def _slots(self, base: Ints, width_of: Ints, bias_of: Ints) -> Ints:
-        slots = np.zeros(len(base), np.int64)
-        state, words, position = self._state, self._words, self._position
-        lanes = len(state)
-        for first in range(0, len(base), lanes):
-            slot = base[first : first + lanes]
-            active = state[: len(slot)]
-            slot = slot + (active & (SCALE - 1))
-            slots[first : first + lanes] = slot
-            active = width_of.take(slot) * (active >> SCALE_BITS) + bias_of.take(slot)
-            short = (active < _LEAST).nonzero()[0]
-            if len(short):
-                more = words[position : position + len(short)]
-                if len(more) < len(short):
-                    raise StreamError("the stream is damaged: a batch ends too early; fetch the file again")
-                active[short] = (active.take(short) << 16) | more
-                position += len(short)
-            state[: len(slot)] = active
-        self._position = position
-        return slots
+    def _refill(self, state: Ints) -> None:
+        """Take a word for each lane that has run low."""
+        low = (state < _LEAST).nonzero()[0]
+        if len(low):
+            more = self._words[self._position : self._position + len(low)]
+            if len(more) < len(low):
+                raise StreamError("the stream is damaged: a batch ends too early; fetch the file again")
+            state[low] = (state.take(low) << 16) | more
+            self._position += len(low)

@@ -11,9 +11,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..core.adjacency import sorting_order
 from ..core.mesh import Bools, Ints
 from .errors import StreamError
 from .fans import Fans
+
+_LEAVES = "the stream is damaged: a split leaves the surface; fetch the file again"
 
 
 @dataclass(frozen=True)
@@ -36,9 +39,15 @@ class Arcs:
     first_ring: Ints
     last_ring: Ints
 
+    def settle(self, bare: Ints, before: Bools) -> None:
+        """Let both new edges of arcs without corners end at one ring vertex: of a lone face `before`, or `after`."""
+        lone = before.take(bare)
+        self.first_ring[bare[lone]] = self.last_ring.take(bare[lone])
+        self.last_ring[bare[~lone]] = self.first_ring.take(bare[~lone])
 
-def walk(fans: Fans, start: Ints, length: Ints, before: Bools) -> Arcs:
-    """Follow each arc from its start.
+
+def walk(fans: Fans, start: Ints, length: Ints) -> Arcs:
+    """Follow each arc from its start; see `Arcs.settle` for arcs without corners.
 
     Raises
     ------
@@ -56,18 +65,17 @@ def walk(fans: Fans, start: Ints, length: Ints, before: Bools) -> Arcs:
             break
         chosen, current = chosen.take(further), fans.successor.take(current.take(further))
         if current.min() < 0 or step > len(fans.slot):
-            raise StreamError("the stream is damaged: a split leaves the surface; fetch the file again")
+            raise StreamError(_LEAVES)
         splits.append(chosen)
         corners.append(current)
         last[chosen] = current
         step += 1
-    bare = length == 0
-    first_ring = fans.following.take(start)
-    last_ring = fans.preceding.take(last)
-    # beside a lone corner both new edges end at the same ring vertex
-    first_ring = np.where(bare & before, last_ring, first_ring)
-    last_ring = np.where(bare & ~before, first_ring, last_ring)
-    return Arcs(np.concatenate(splits), np.concatenate(corners), last, first_ring, last_ring)
+    corner = np.concatenate(corners)
+    met = np.zeros(len(fans.slot), bool)
+    met[corner] = True
+    if np.count_nonzero(met) < len(corner):  # one goes around its fan more than once
+        raise StreamError(_LEAVES)
+    return Arcs(np.concatenate(splits), corner, last, fans.following.take(start), fans.preceding.take(last))
 
 
 @dataclass(frozen=True)
@@ -102,40 +110,44 @@ class Openings:
         return diagonal == (self.torn_at.take(self.partner) >= self.there.shape[1])
 
 
-def openings(fans: Fans, arcs: Arcs, vertex: Ints, start: Ints, there: Bools, faces: Ints, count: int) -> Openings:
+def openings(fans: Fans, arcs: Arcs, chosen: Bools, vertex: Ints, start: Ints, there: Bools, faces: Ints) -> Openings:
     """Find the third corners of the new faces.
 
     Parameters
     ----------
     fans, arcs
         Of the mesh before the batch.
+    chosen : ndarray, (n,) bool
+        The vertices that split, as `vertex` lists them.
     vertex, start : ndarray, (k,) int64
     there : ndarray, (2, k) bool
     faces : ndarray, (3, m) int64
         With the corners of the arcs moved to the new vertices.
-    count : int
-        Number of vertices before the batch.
     """
     ring = np.stack((arcs.first_ring, arcs.last_ring))
-    keys = (vertex * count + ring).ravel()
-    cuts = np.flatnonzero(there.ravel())
-    cuts = cuts.take(np.argsort(keys.take(cuts), kind="stable"))
-    sorted_keys = keys.take(cuts)
-    back = (ring * count + vertex).ravel()
-    place = np.searchsorted(sorted_keys, back).clip(max=max(len(cuts) - 1, 0))
-    torn = (there.ravel() & (sorted_keys.take(place) == back)) if len(cuts) else np.zeros(there.size, bool)
-    torn_at = np.flatnonzero(torn)
-    number = np.zeros(there.size, np.int64)
-    number[torn_at] = np.arange(len(torn_at))
-    partner = number.take(cuts.take(place.take(torn_at)))
-    torn = torn.reshape(there.shape)
-    width = faces.shape[1]
-    flat = faces.ravel()
-    size = len(flat)
+    torn_at, partner = _torn(chosen, vertex, ring, there)
+    torn = np.zeros(there.shape, bool)
+    torn.ravel()[torn_at] = True
     # the neighbour of the new face holds the ring vertex as it is after the batch
     bare_before = there[0] & ~there[1] & (arcs.first_ring != fans.following.take(start))
     bare_after = there[1] & ~there[0] & (arcs.last_ring != fans.preceding.take(arcs.last))
-    first = flat.take((fans.slot.take(start) + width) % max(size, 1)) if size else ring[0]
-    last = flat.take((fans.slot.take(arcs.last) + 2 * width) % max(size, 1)) if size else ring[1]
+    (row, face), (last_row, last_face) = (np.divmod(fans.slot.take(at), max(faces.shape[1], 1))
+                                          for at in (start, arcs.last))
+    first, last = faces[(row + 1) % 3, face], faces[(last_row + 2) % 3, last_face]
     third = np.stack((np.where(bare_before, last, first), np.where(bare_after, first, last)))
     return Openings(there, np.where(torn, ring, third), torn, torn_at, partner)
+
+
+def _torn(chosen: Bools, vertex: Ints, ring: Ints, there: Bools) -> tuple[Ints, Ints]:
+    """Return the openings whose edge is opened from its other end too, and the place among them of the other one."""
+    cuts = np.flatnonzero(there.ravel() & chosen.take(ring.ravel()))
+    own, other = vertex.take(cuts % len(vertex)) if len(cuts) else cuts, ring.ravel().take(cuts)
+    keys = own * len(chosen) + other
+    order = sorting_order(keys)
+    ranked = keys.take(order)
+    back = other * len(chosen) + own
+    place = np.searchsorted(ranked, back)
+    torn = np.flatnonzero(ranked.take(place, mode="clip") == back) if len(cuts) else cuts
+    number = np.zeros(len(cuts), np.int64)
+    number[torn] = np.arange(len(torn))
+    return cuts.take(torn), number.take(order.take(place.take(torn)))

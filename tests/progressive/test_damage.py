@@ -2,6 +2,8 @@
 """A damaged stream gives one clear error, or its good prefix; never anything else."""
 
 import json
+import subprocess
+import sys
 import warnings
 import zlib
 from pathlib import Path
@@ -150,3 +152,25 @@ def test_a_failed_save_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.M
         mesh.save(path)
     assert path.read_bytes() == b"old"
     assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_killed_save_leaves_the_old_file(tmp_path: Path, root: Path) -> None:
+    path = tmp_path / "a.esopm"
+    path.write_bytes(b"old")
+    killed = """
+import os, sys
+from pathlib import Path
+from eso_addon.progressive.progressive import progressive
+
+def half(self, data):
+    with self.open("wb") as file:
+        file.write(data[: len(data) // 2])
+        file.flush()
+        os._exit(7)  # nothing is tidied up, as when a process is killed
+
+Path.write_bytes = half
+progressive([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]).save(sys.argv[1])
+"""
+    done = subprocess.run([sys.executable, "-c", killed, str(path)], cwd=root, check=False)
+    assert done.returncode == 7
+    assert path.read_bytes() == b"old"
