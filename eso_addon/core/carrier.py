@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 from .adjacency import components
 from .attributes import AttributeSet, Layer, blended
 from .carried import Carried
-from .carry import Ground, Places, find_places, numbered
+from .carry import Ground, Places, find_places, numbered, positions
 from .edge_data import carried_edges
 from .lines import Lines
 from .mesh import Bools, Floats, Ints
@@ -27,7 +28,8 @@ class _Level(NamedTuple):
     """A level on its way: where its wedges and corners lie on the original."""
 
     places: Places
-    slot: Ints
+    corner: Ints
+    vertex: Ints
     target: Ints
     wedge_of: Ints
     unmoved: Bools
@@ -127,9 +129,9 @@ class Carrier:
             slot = slot.take(slots.ravel())
         target = places.target.ravel().take(slot)
         number, wedge_of, vertex_map = self._part(places, slot, target)
-        unmoved = (self._points.take(self._lines.faces.ravel().take(slot), axis=1)
-                   == there.take(corners.ravel(), axis=1)).all(axis=0)
-        at = _Level(places, slot, target, wedge_of, unmoved, face_map, there)
+        vertex = self._lines.faces.ravel().take(slot)
+        unmoved = (self._points == there.take(survivor, axis=1)).all(axis=0).take(vertex)
+        at = _Level(places, self._lines.corner.ravel().take(slot), vertex, target, wedge_of, unmoved, face_map, there)
         carried = self._values(self._own, at)
         points, parted = placed.take(places.vertex.take(wedge_of), axis=0), number.reshape(-1, 3)
         edges, on_edges = carried_edges(self._own, self._points, self._mesh.vertex, self._lines, survivor,
@@ -145,9 +147,9 @@ class Carrier:
         carried = {}
         for layer in attributes.layers:
             if layer.domain == "corner":
-                values = self._at_corners(layer, at.places, at.slot, at.unmoved)
+                values = self._at_corners(layer, at)
                 if layer.kind == "uv":
-                    values = self._turned_back(layer, values, at.places, at.slot, at.there)
+                    values = self._turned_back(layer, values, at)
             elif layer.domain == "vertex":
                 values = self._at_wedges(layer, at.places, self._vertex).take(at.wedge_of, axis=0)
             elif layer.domain == "face":
@@ -164,15 +166,15 @@ class Carrier:
         rows[survivor.take(self._mesh.vertex.take(inside)), mirror.axis] = 0
         return rows[:-1]
 
-    def _at_corners(self, layer: Layer, places: Places, slot: Ints, unmoved: Bools) -> NDArray:
-        values = self._at_wedges(layer, places, self._lines.corner).take(places.target.ravel().take(slot), axis=0)
-        values[unmoved] = layer.rows.take(self._lines.corner.ravel().take(slot[unmoved]), axis=0)
+    def _at_corners(self, layer: Layer, at: _Level) -> NDArray:
+        values = self._at_wedges(layer, at.places, self._lines.corner).take(at.target, axis=0)
+        values[at.unmoved] = layer.rows.take(at.corner[at.unmoved], axis=0)
         return values
 
-    def _turned_back(self, layer: Layer, values: NDArray, places: Places, slot: Ints, there: Floats) -> NDArray:
+    def _turned_back(self, layer: Layer, values: NDArray, at: _Level) -> NDArray:
         """Turn back UV triangles that lie the other way round than their source."""
-        faces = places.target.ravel().take(slot).reshape(-1, 3)
-        source = layer.rows.take(self._lines.corner.ravel().take(slot), axis=0).astype(np.float64).reshape(-1, 3, 2)
+        places, there, faces = at.places, at.there, at.target.reshape(-1, 3)
+        source = layer.rows.take(at.corner, axis=0).astype(np.float64).reshape(-1, 3, 2)
         turns = areas_of(source)
         if not (areas_of(values.reshape(-1, 3, 2)) * turns < 0).any():
             return values
@@ -185,7 +187,7 @@ class Carrier:
         values[moved] = mended.take(faces.ravel()[moved], axis=0)
         if still.any():
             corners = there.take(places.vertex.take(faces[still]), axis=1).transpose(1, 2, 0)
-            before = self._points.take(self._lines.faces.ravel().take(slot.reshape(-1, 3)[still]), axis=1)
+            before = self._points.take(at.vertex.reshape(-1, 3)[still], axis=1)
             values.reshape(-1, 3, 2)[still] = mapped_by_source(corners, before.transpose(1, 2, 0), source[still])
             over = still & (areas_of(values.reshape(-1, 3, 2)) * turns <= 0)
             values.reshape(-1, 3, 2)[over] = source[over]  # turned over in space too
@@ -199,22 +201,32 @@ class Carrier:
 
         Returns the vertex of each of the level's corners, a wedge of each vertex, and the input's vertex map.
         """
-        wedges, vertex = places.target.ravel(), self._vertex.ravel()
-        one = np.full(len(self._mesh.vertex), -1)
-        one[vertex] = np.arange(len(vertex))  # of several the last holds
-        other = wedges.take(one.take(vertex))
-        apart = np.flatnonzero(wedges != other)
-        group = components(len(places.vertex), wedges.take(apart), other.take(apart))
+        wedge, links = self._joined
+        ones, others = places.number.take(links)
+        apart = np.flatnonzero(ones != others)
+        group = components(len(places.vertex), ones.take(apart), others.take(apart))
         group = _in_order(group, places.vertex)
-        sheet = np.zeros(len(one), np.int64) if self._mesh.sheet is None else self._mesh.sheet
-        count = int(sheet.max(initial=0)) + 1
-        groups = int(group.max(initial=-1)) + 1
-        keys, number = numbered(group.take(target) * count + sheet.take(vertex.take(slot)), groups * count)
+        keys, wanted = group.take(target), np.where(wedge < 0, -1, group.take(places.number.take(wedge, mode="clip")))
+        bound = int(group.max(initial=-1)) + 1
+        if self._mesh.sheet is not None:
+            count = int(self._mesh.sheet.max(initial=0)) + 1
+            keys = keys * count + self._mesh.sheet.take(self._vertex.ravel().take(slot))
+            wanted = np.where(wedge < 0, -1, wanted * count + self._mesh.sheet)
+            bound *= count
+        keys, number = numbered(keys, bound)
         wedge_of = np.zeros(len(keys), np.int64)
         wedge_of[number[::-1]] = target[::-1]  # of several the first holds
-        wanted = np.where(one < 0, -1, group.take(wedges.take(one, mode="clip")) * count + sheet)
-        found = np.searchsorted(keys, wanted).clip(max=len(keys) - 1)
-        return number, wedge_of, np.where(keys[found] == wanted, found, -1)
+        return number, wedge_of, positions(keys, wanted, bound)
+
+    @cached_property
+    def _joined(self) -> tuple[Ints, Ints]:
+        """A wedge at each of the input's vertices, -1 where it has no face, and (2, k) wedges that share a vertex."""
+        vertex, wedges = self._vertex.ravel(), self._lines.wedge.ravel()
+        wedge = np.full(len(self._mesh.vertex), -1)
+        wedge[vertex] = wedges  # of several the last holds
+        others = wedge.take(vertex)
+        apart = np.flatnonzero(wedges != others)
+        return wedge, np.stack((wedges.take(apart), others.take(apart)))
 
 
 def _in_order(group: Ints, vertex: Ints) -> Ints:

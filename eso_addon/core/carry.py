@@ -7,13 +7,13 @@ corners takes its values from the point closest to it on the faces around that p
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
 from .adjacency import components
-from .blocks import Blocks
 from .closest import closest_in_triangles, squared_distances, triangle_frames
 from .lines import Lines
 from .mesh import Floats, Ints
@@ -26,8 +26,10 @@ class Places(NamedTuple):
 
     Attributes
     ----------
+    number : ndarray, (w,) int64
+        The wedge of the level that each of the engine's wedges has become.
     target : ndarray, (3, m) int64
-        For each corner of the engine's faces, the wedge of the level that it has become.
+        The same for each corner of the engine's faces.
     face : ndarray, (t,) int64
         The engine's face that each wedge lies on.
     weights : ndarray, (3, t) float64
@@ -36,6 +38,7 @@ class Places(NamedTuple):
         The vertex of the level at each wedge.
     """
 
+    number: Ints
     target: Ints
     face: Ints
     weights: Floats
@@ -105,7 +108,7 @@ def find_places(ground: Ground, survivor: Ints, placed: Floats) -> Places:
     moved = np.flatnonzero(reach > 0)
     if len(moved):
         face[moved], weights[:, moved] = _closest(ground, target, there, reach, moved)
-    return Places(target, face, weights, vertex)
+    return Places(number, target, face, weights, vertex)
 
 
 def _targets(ground: Ground, merged: Ints, survivor: Ints) -> tuple[Ints, Ints]:
@@ -145,6 +148,16 @@ def numbered(keys: Ints, bound: int) -> tuple[Ints, Ints]:
     return np.flatnonzero(there), (np.cumsum(there) - 1).take(keys)
 
 
+def positions(names: Ints, wanted: Ints, bound: int) -> Ints:
+    """Return where each of the wanted is among ascending names, -1 where it is not, or is below zero."""
+    if bound > 8 * len(wanted) + 1024:
+        found = np.searchsorted(names, wanted).clip(max=len(names) - 1)
+        return np.where(names[found] == wanted, found, -1)
+    table = np.full(bound + 1, -1)
+    table[names] = np.arange(len(names))
+    return table.take(wanted)
+
+
 def _nearest_corners(ground: Ground, number: Ints, there: Floats) -> tuple[Ints, Floats]:
     """Return, for each of a level's wedges, the nearest corner that became it, as a slot, and how far that is."""
     offset = ground.places - there.take(number, axis=1)
@@ -159,38 +172,55 @@ def _nearest_corners(ground: Ground, number: Ints, there: Floats) -> tuple[Ints,
 
 def _closest(ground: Ground, target: Ints, there: Floats, reach: Floats, moved: Ints) -> tuple[Ints, Floats]:
     """Return the closest faces, among those with a corner in the wedge, of the wedges `moved`, and weights in them."""
-    blocks = Blocks()
-    limit = np.where(reach > 0, reach * (1 + 1e-9), -np.inf)  # what has not moved is where it was
-
-    def near(part: slice) -> tuple[Ints, Ints]:
-        """Find the faces that may come closer than the nearest corner."""
-        middle, radius = ground.spheres[:3, part], ground.spheres[3, part]
-        found = []
-        for side in range(3):
-            own = target[side, part]
-            within = limit.take(own) + radius
-            new = (_square(middle - there.take(own, axis=1)) <= within * within) & (within > 0)
-            for before in range(side):
-                new &= target[before, part] != own
-            chosen = np.flatnonzero(new)
-            found.append((chosen + part.start, own.take(chosen)))
-        return tuple(np.concatenate(rows) for rows in zip(*found, strict=True))
-
-    faces, wedges = (np.concatenate(rows) for rows in zip(*blocks.map(near, target.shape[1], _BLOCK), strict=True))
-    frames, squared = ground.frames(faces), np.empty(len(faces))
-
-    def measure(part: slice) -> None:
+    faces, wedges, offset = _near(ground, target, there, reach)
+    frames = ground.frames(faces)
+    radius, offset = ground.spheres[3].take(faces), np.sqrt(offset)
+    # the face whose middle is nearest tells how close the closest is at least: most others are further away
+    first = _least(offset, wedges, there.shape[1]).take(moved)
+    reach = np.zeros(there.shape[1])
+    reach[moved] = np.sqrt(squared_distances(frames.take(faces.take(first), axis=1), there.take(moved, axis=1)))
+    left = np.flatnonzero(offset <= (reach.take(wedges) + radius) * (1 + 1e-9))
+    faces, wedges = faces.take(left), wedges.take(left)
+    squared = np.empty(len(faces))
+    for part in _parts(len(faces), _BLOCK // 4):
         squared[part] = squared_distances(frames.take(faces[part], axis=1), there.take(wedges[part], axis=1))
-
-    blocks.map(measure, len(wedges), _BLOCK // 4)
-    best = np.full(there.shape[1], np.inf)
-    np.minimum.at(best, wedges, squared)
-    won = np.flatnonzero(squared <= best.take(wedges))[::-1]
-    chosen = np.zeros(there.shape[1], np.int64)
-    chosen[wedges.take(won)] = won
-    face = faces.take(chosen.take(moved))
+    face = faces.take(_least(squared, wedges, there.shape[1]).take(moved))
     place = closest_in_triangles(frames.take(face, axis=1), there.take(moved, axis=1))[0]
     return face, _barycentric(ground.points, ground.lines.faces.take(face, axis=1), place)
+
+
+def _near(ground: Ground, target: Ints, there: Floats, reach: Floats) -> tuple[Ints, Ints, Floats]:
+    """Return the faces that may come closer to a wedge than its nearest corner: faces, wedges, squares to middles."""
+    limit = reach * (1 + 1e-9)
+    moved, found = reach > 0, []
+    for part in _parts(target.shape[1], _BLOCK):
+        for side in range(3):
+            new = moved.take(target[side, part])
+            for before in range(side):
+                new &= target[before, part] != target[side, part]
+            face = np.flatnonzero(new) + part.start
+            own = target[side].take(face)
+            sphere = ground.spheres.take(face, axis=1)
+            offset = _square(sphere[:3] - there.take(own, axis=1))
+            within = np.flatnonzero(offset <= (limit.take(own) + sphere[3]) ** 2)
+            found.append((face.take(within), own.take(within), offset.take(within)))
+    faces, wedges, offsets = (np.concatenate(rows) for rows in zip(*found, strict=True))
+    return faces, wedges, offsets
+
+
+def _least(values: Floats, wedges: Ints, count: int) -> Ints:
+    """Return which of the values is the least of each wedge, of equals the first; 0 where a wedge has none."""
+    best = np.full(count, np.inf)
+    np.minimum.at(best, wedges, values)
+    won = np.flatnonzero(values <= best.take(wedges))[::-1]
+    chosen = np.zeros(count, np.int64)
+    chosen[wedges.take(won)] = won
+    return chosen
+
+
+def _parts(count: int, size: int) -> Iterator[slice]:
+    """Yield slices that stay in the processor's cache."""
+    return (slice(start, min(start + size, count)) for start in range(0, count, size))
 
 
 def _square(vectors: Floats) -> Floats:
