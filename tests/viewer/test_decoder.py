@@ -39,10 +39,8 @@ DECODE = """async () => {
   }
   const same = [];
   for (const mesh of meshes) same.push((await digest(mesh)) === mesh.head.hash);
-  const { Sha256 } = await import('/hash.js');
-  const own = new Sha256();
-  own.update(bytes);
-  return { rows, same, own: own.hex() };
+  const { sha256 } = await import('/hash.js');
+  return { rows, same, own: await sha256(bytes, null) };
 }"""
 
 

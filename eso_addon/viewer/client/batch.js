@@ -1,71 +1,44 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A batch of vertex splits: who splits, how long the arc is, where it starts, what opens; then carried out.
-import { Model } from './coder.js';
-import { StreamError } from './container.js';
-import { Fan } from './fan.js';
+// A batch of vertex splits: who splits, how long the arc is, where it starts, what opens, where it is; then carried out.
+import { bitLength, sizeClass } from './coder.js';
+import { check } from './container.js';
+import { makeFan } from './fan.js';
 
 const ESCAPE = 15;
-const damaged = (what) => new StreamError(`The file is damaged: ${what}.`);
+const CLASSES = 72;
 
-export class Connectivity {
-  constructor(places) {
-    this.flag = new Model(64, 2);
-    this.length = new Model(16, 16);
-    this.start = new Model(128, 16);
-    this.sides = new Model(3, 4);
-    this.torn = new Model(2, 2);
-    this.degree = new Int32Array(places);
-    this.label = new Int32Array(places).fill(-1); // which split a place is in
-    this.fan = new Fan();
-    this.corners = new Int32Array(0);
-  }
-
-  /** Take in the faces of the base. */
-  base(faces, count) {
-    for (let at = 0; at < 3 * count; at++) this.degree[faces[at]]++;
-  }
-
-  /** Read a batch from the mesh's coder and carry it out; gives corners that moved and the face beside each new one. */
-  batch(mesh, placesAfter, facesAfter) {
-    const { coder, places: n } = mesh;
-    const vertex = coder.flags(this.flag, this.degree, n);
-    const k = vertex.length;
-    if (n + k !== placesAfter) throw damaged('a batch holds other counts than its table');
-    const first = new Int32Array(k + 1);
-    for (let i = 0; i < k; i++) {
-      this.label[vertex[i]] = i;
-      first[i + 1] = first[i] + this.degree[vertex[i]];
-    }
-    const length = this.small(coder, this.length, contexts(first, null));
-    const rank = this.small(coder, this.start, contexts(first, length));
-    const corners = this.gather(mesh.faces, mesh.faceCount, first);
-    const arcs = this.fan.arcs(mesh, vertex, first, corners, length, rank);
-    this.opens(coder, arcs, mesh.geometry);
-    const moved = this.move(mesh, vertex, arcs);
-    const third = this.thirds(mesh, vertex, arcs);
-    mesh.geometry.read(mesh, vertex, arcs);
-    const beside = this.grow(mesh, vertex, arcs, third, facesAfter);
-    for (let i = 0; i < k; i++) this.label[vertex[i]] = -1;
-    mesh.places = n + k;
-    mesh.faceCount += beside.length;
-    return { moved, beside };
-  }
+/** A function that reads the next batch of a mesh and carries it out. */
+export function makeSplitter(mesh, coder) {
+  const { faces, points, parents, facesAfter, grid } = mesh;
+  const opening = 3 * mesh.head.extra; // corners of faces beside the splits
+  const room = parents.length;
+  const degree = new Int32Array(room); // faces at each place
+  const label = new Int32Array(room).fill(-1); // which split a place is in
+  const follow = makeFan(points, grid.shift);
+  const { choose } = coder.model(21, 2);
+  const readLengths = coder.model(16, 16).read;
+  const readStarts = coder.model(128, 16).read;
+  const readSides = coder.model(3, 4).read;
+  const readTorn = coder.model(2, 2).read;
+  const readClasses = [0, 1, 2].map(() => coder.model(CLASSES, CLASSES, true).read);
+  for (let at = opening; at < 3 * mesh.faceCount; at++) degree[faces[at]]++;
 
   /** Numbers that are mostly below 15; the others follow as plain bits. */
-  small(coder, model, context) {
-    const out = Int32Array.from(coder.symbols(model, context, context.length));
+  function small(read, contexts) {
+    const out = new Int32Array(read(contexts));
     for (let i = 0; i < out.length; i++) if (out[i] === ESCAPE) out[i] = Math.min(coder.bits(32), 0x7fffffff);
     return out;
   }
 
-  /** Corners at splitting places, place by place: 3 * face + row, and the places that follow and precede there. */
-  gather(faces, count, first) {
-    const { label } = this;
-    const size = 3 * first[first.length - 1];
-    if (this.corners.length < size) this.corners = new Int32Array(2 * size);
-    const out = this.corners;
-    const fill = first.map((at) => 3 * at);
-    for (let at = 0; at < 3 * count; at += 3) {
+  /**
+   * Corners at splitting places, split by split: 3 * face + row, and the places that follow and precede there. Meanwhile a
+   * place's label says where its next corner goes.
+   */
+  function gather(vertex, first) {
+    const out = new Int32Array(3 * first[vertex.length]);
+    for (let i = 0; i < vertex.length; i++) label[vertex[i]] = 3 * first[i];
+    const end = 3 * mesh.faceCount;
+    for (let at = opening; at < end; at += 3) {
       const a = faces[at];
       const b = faces[at + 1];
       const c = faces[at + 2];
@@ -73,151 +46,202 @@ export class Connectivity {
       const j = label[b];
       const k = label[c];
       if (i >= 0) {
-        const to = fill[i];
-        fill[i] = to + 3;
-        out[to] = at;
-        out[to + 1] = b;
-        out[to + 2] = c;
+        label[a] = i + 3;
+        out[i] = at;
+        out[i + 1] = b;
+        out[i + 2] = c;
       }
       if (j >= 0) {
-        const to = fill[j];
-        fill[j] = to + 3;
-        out[to] = at + 1;
-        out[to + 1] = c;
-        out[to + 2] = a;
+        label[b] = j + 3;
+        out[j] = at + 1;
+        out[j + 1] = c;
+        out[j + 2] = a;
       }
       if (k >= 0) {
-        const to = fill[k];
-        fill[k] = to + 3;
-        out[to] = at + 2;
-        out[to + 1] = a;
-        out[to + 2] = b;
+        label[c] = k + 3;
+        out[k] = at + 2;
+        out[k + 1] = a;
+        out[k + 2] = b;
       }
     }
+    for (let i = 0; i < vertex.length; i++) label[vertex[i]] = i;
     return out;
   }
 
   /** Which faces open: bit 0 `before`, bit 1 `after`; asked only at the ends of fans. */
-  opens(coder, arcs, geometry) {
-    const { asked, askedContext, there, x, y, length } = arcs;
-    const sides = coder.symbols(this.sides, askedContext, asked.length);
-    for (let at = 0; at < asked.length; at++) {
-      const i = asked[at];
-      if (sides[at] === 0) throw damaged('a split opens no face');
-      there[i] = sides[at];
-      if (length[i] > 0) continue;
+  function open(arcs) {
+    const { asked, there, x, y, length } = arcs;
+    const sides = readSides(Uint8Array.from(asked.filter((_, at) => at & 1)));
+    sides.forEach((side, at) => {
+      const i = asked[2 * at];
+      check(side);
+      there[i] = side;
+      if (length[i]) return;
       // beside a lone corner both new edges end at the same ring vertex
-      if (there[i] & 1) x[i] = y[i];
+      if (side & 1) x[i] = y[i];
       else y[i] = x[i];
-      geometry.expectBare(arcs, i);
-    }
+      expectBare(arcs, i);
+    });
   }
 
-  /** Move the corners of all arcs to the new places; gives them step by step, as their wedges are stored. */
-  move({ faces, plain, places: n }, vertex, { length, arcFirst, arcCorner }) {
-    const { degree } = this;
-    let most = 0;
+  /** What a split without an arc expects: its ring is its own place and one more. */
+  function expectBare({ vertex, x, mean, normal, axis, spread }, i) {
+    let sum = 0;
+    for (let a = 0; a < 3; a++) {
+      const own = points[4 * vertex[i] + a];
+      const end = points[4 * x[i] + a];
+      const m = (mean[3 * i + a] = Math.floor((own + end + 1) / 2));
+      sum += Math.abs(own - m) + Math.abs(end - m);
+      normal[3 * i + a] = axis[i] = 0;
+    }
+    spread[i] = Math.floor(sum / 2);
+  }
+
+  /** Move the corners of all arcs to the new places. */
+  function move({ vertex, length, begin, corner }) {
+    const n = mesh.places;
     for (let i = 0; i < vertex.length; i++) {
-      const end = arcFirst[i + 1];
-      for (let at = arcFirst[i]; at < end; at++) faces[arcCorner[at]] = n + i;
+      for (let at = begin[i]; at < begin[i + 1]; at++) faces[corner[at]] = n + i;
       degree[vertex[i]] -= length[i];
       degree[n + i] = length[i];
-      if (length[i] > most) most = length[i];
     }
-    if (plain) return null;
-    const fill = new Int32Array(most + 1);
-    for (let i = 0; i < vertex.length; i++) for (let step = 0; step < length[i]; step++) fill[step + 1]++;
-    for (let step = 0; step < most; step++) fill[step + 1] += fill[step];
-    const moved = new Int32Array(arcFirst[vertex.length]);
-    for (let i = 0; i < vertex.length; i++) {
-      for (let step = 0; step < length[i]; step++) moved[fill[step]++] = arcCorner[arcFirst[i] + step];
-    }
-    return moved;
   }
 
   /** Third corners of the new faces, `before` and `after` of each split; asks for the diagonals of torn edges. */
-  thirds({ faces, coder, places: n }, vertex, { x, y, there, startCorner, lastCorner, length }) {
-    const { label } = this;
+  function thirds({ vertex, x, y, there, start, last, length }) {
     const k = vertex.length;
     const third = new Int32Array(2 * k);
     const torn = []; // openings whose edge opens from the other end too, and those there; as side * k + split
-    const other = [];
     for (let side = 0; side < 2; side++) {
       const ends = side ? y : x;
       for (let i = 0; i < k; i++) {
         if (((there[i] >> side) & 1) === 0) continue;
-        const ring = ends[i];
-        const j = label[ring];
+        const j = label[ends[i]];
         if (j >= 0) {
           const v = vertex[i];
-          const partner = there[j] & 1 && x[j] === v ? j : there[j] & 2 && y[j] === v ? k + j : -1;
-          if (partner >= 0) {
-            torn.push(side * k + i);
-            other.push(partner);
+          if (there[j] & 1 && x[j] === v) {
+            torn.push(side * k + i, j);
+            continue;
+          }
+          if (there[j] & 2 && y[j] === v) {
+            torn.push(side * k + i, k + j);
             continue;
           }
         }
         // the neighbour of the new face holds the ring's place as it is after the batch; a lone face beside a lone
         // corner lies at the other side of it
         const isLast = length[i] ? side : 1 - side;
-        const at = isLast ? lastCorner[i] : startCorner[i];
+        const at = isLast ? last[i] : start[i];
         const row = at % 3;
         third[2 * i + side] = faces[at - row + ((row + 1 + isLast) % 3)];
       }
     }
     if (!torn.length) return third;
     let asked = 0;
-    for (let t = 0; t < torn.length; t++) if (torn[t] <= other[t]) asked++;
-    const answers = coder.symbols(this.torn, new Uint8Array(asked), asked);
+    for (let t = 0; t < torn.length; t += 2) if (torn[t] <= torn[t + 1]) asked++;
+    const answers = readTorn(new Uint8Array(asked));
     const diagonal = new Uint8Array(2 * k);
-    for (let t = 0, at = 0; t < torn.length; t++) if (torn[t] <= other[t]) diagonal[torn[t]] = answers[at++];
-    for (let t = 0; t < torn.length; t++) {
+    for (let t = 0, at = 0; t < torn.length; t += 2) {
       const own = torn[t];
-      const i = own < k ? own : own - k;
-      const side = own < k ? 0 : 1;
-      const upper = diagonal[Math.min(own, other[t])] === (other[t] >= k ? 1 : 0);
-      const ring = side ? y[i] : x[i];
-      third[2 * i + side] = upper ? n + label[ring] : ring;
+      const other = torn[t + 1];
+      if (own <= other) diagonal[own] = answers[at++];
+      const i = own % k;
+      const ring = own < k ? x[i] : y[i];
+      const upper = diagonal[Math.min(own, other)] === (other >= k ? 1 : 0);
+      third[2 * i + (own < k ? 0 : 1)] = upper ? mesh.places + label[ring] : ring;
     }
     return third;
   }
 
+  /** Read the positions of the new places: expected from the ring around them; the rest is read. */
+  function locate({ vertex, mean, normal, axis, spread }) {
+    const { places } = mesh;
+    const k = vertex.length;
+    const scale = spread.slice();
+    const lean = new Float64Array(k);
+    const base = new Float64Array(k);
+    const contexts = new Uint8Array(k);
+    for (let step = 0; step < 3; step++) {
+      for (let i = 0; i < k; i++) {
+        const a = (axis[i] + 1 + step) % 3;
+        let value = mean[3 * i + a];
+        if (step === 2) value = points[4 * vertex[i] + a] - Math.floor(lean[i] / (normal[3 * i + a] || 1));
+        let context = sizeClass(scale[i]);
+        if (grid.floats) context += 2 * (24 - bitLength(Math.abs(value) + scale[i]));
+        base[i] = grid.numberOf(value);
+        contexts[i] = context < 0 ? 0 : context < CLASSES ? context : CLASSES - 1;
+      }
+      const rest = coder.numbers(readClasses[step](contexts));
+      for (let i = 0; i < k; i++) {
+        const a = (axis[i] + 1 + step) % 3;
+        const point = grid.put(places + i, a, base[i] + rest[i]);
+        lean[i] += normal[3 * i + a] * (point - points[4 * vertex[i] + a]);
+        scale[i] = Math.floor((spread[i] + 3 * Math.abs(point - mean[3 * i + a]) + 1) / 2);
+      }
+    }
+  }
+
   /** Add new places and faces; gives the face in which the arc beside each new one starts. */
-  grow(mesh, vertex, { startCorner, there }, third, facesAfter) {
-    const { faces, faceCount: m, places: n, parents, facesAfter: counts } = mesh;
-    const { extra } = mesh.head;
-    const { degree } = this;
-    const beside = new Int32Array(facesAfter - m);
-    let face = m;
+  function grow({ vertex, start, there }, third, until) {
+    const { faceCount, places } = mesh;
+    const besides = new Int32Array(until - faceCount);
+    let face = faceCount;
     for (let i = 0; i < vertex.length; i++) {
       const v = vertex[i];
-      const u = n + i;
+      const u = places + i;
       for (let side = 0; side < 2; side++) {
         if (((there[i] >> side) & 1) === 0) continue;
-        if (face >= facesAfter) throw damaged('a batch holds more than its table says');
-        beside[face - m] = ((startCorner[i] / 3) | 0) + extra;
-        const at = 3 * face++;
+        check(face < until);
+        besides[face - faceCount] = Math.floor(start[i] / 3);
         const last = third[2 * i + side];
-        faces[at] = side ? v : u;
-        faces[at + 1] = side ? u : v;
-        faces[at + 2] = last;
+        faces[3 * face] = side ? v : u;
+        faces[3 * face + 1] = side ? u : v;
+        faces[3 * face + 2] = last;
         degree[u]++;
         degree[v]++;
         degree[last]++;
+        face++;
       }
       parents[u] = v;
-      counts[u] = face;
+      facesAfter[u] = face;
+      label[v] = -1;
     }
-    return beside.subarray(0, face - m);
+    check(face === until);
+    mesh.places += vertex.length;
+    mesh.faceCount = face;
+    return besides;
   }
-}
 
-/** Contexts by degree, and by length where that is known. */
-function contexts(first, length) {
-  const out = new Uint8Array(first.length - 1);
-  for (let i = 0; i < out.length; i++) {
-    const degree = Math.min(first[i + 1] - first[i], 15);
-    out[i] = length ? degree * 8 + Math.min(length[i], 7) : degree;
-  }
-  return out;
+  return (symbols, bits, places, until) => {
+    coder.feed(symbols, bits);
+    const vertex = choose(degree, mesh.places);
+    const k = vertex.length;
+    check(mesh.places + k === places);
+    const first = new Int32Array(k + 1); // corner of each split
+    const contexts = new Uint8Array(k);
+    for (let i = 0; i < k; i++) {
+      const corners = degree[vertex[i]];
+      first[i + 1] = first[i] + corners;
+      contexts[i] = corners < 15 ? corners : 15;
+    }
+    const length = small(readLengths, contexts);
+    let total = 0;
+    for (let i = 0; i < k; i++) {
+      check(length[i] <= degree[vertex[i]]);
+      contexts[i] = 8 * contexts[i] + (length[i] < 7 ? length[i] : 7);
+      total += length[i];
+    }
+    const rank = small(readStarts, contexts);
+    const ints = (count) => new Int32Array(count);
+    const arcs = {
+      vertex, length, corner: ints(total), begin: ints(k + 1), start: ints(k), last: ints(k), x: ints(k), y: ints(k), asked: [],
+      there: new Uint8Array(k).fill(3), mean: ints(3 * k), normal: new Float64Array(3 * k), axis: new Uint8Array(k), spread: ints(k),
+    };
+    follow(arcs, first, gather(vertex, first), rank);
+    open(arcs);
+    move(arcs);
+    const third = thirds(arcs);
+    locate(arcs);
+    return { ...arcs, besides: grow(arcs, third, until) };
+  };
 }

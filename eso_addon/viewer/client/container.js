@@ -1,13 +1,18 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The file's frame: magic, version, header, table of blocks. docs/format.md says what each byte is.
 
-export class StreamError extends Error {}
+/** What went wrong with the file or the line; `again`: asking once more may help. */
+export class StreamError extends Error {
+  constructor(message, again = false) {
+    super(message);
+    this.again = again;
+  }
+}
 
 export const FIXED = 24; // bytes before the header
 const MAGIC = [0x89, 0x45, 0x53, 0x4f, 0x50, 0x4d, 0x0d, 0x0a];
 const KNOWN = ['wedges', 'attributes', 'extra-faces', 'edges', 'turned', 'quantised'];
 const ROW = 24;
-const LARGEST = 1 << 28; // bytes that a block may unpack to
 
 const CRC = new Int32Array(256).map((_, n) => {
   for (let k = 0; k < 8; k++) n = n & 1 ? (n >>> 1) ^ 0xedb88320 : n >>> 1;
@@ -21,76 +26,48 @@ export function crc32(bytes) {
   return ~crc >>> 0;
 }
 
-/** Unpack raw deflate. */
-export async function inflate(bytes, limit = LARGEST) {
-  if (!bytes.length) return new Uint8Array(0);
-  const parts = [];
-  let size = 0;
-  const reader = new Blob([bytes]).stream().pipeThrough(new DecompressionStream('deflate-raw')).getReader();
-  try {
-    for (let part = await reader.read(); !part.done; part = await reader.read()) {
-      parts.push(part.value);
-      if ((size += part.value.length) > limit) throw 0;
-    }
-  } catch {
-    reader.cancel().catch(() => {});
-    throw new StreamError('The file is damaged: a block cannot be unpacked.');
-  }
-  if (parts.length === 1) return parts[0];
-  const whole = new Uint8Array(size);
-  let at = 0;
-  for (const part of parts) {
-    whole.set(part, at);
-    at += part.length;
-  }
-  return whole;
+/** Refuse what no writer writes. */
+export function check(sound, what = 'The file is damaged.') {
+  if (!sound) throw new StreamError(what);
 }
 
-const view = (bytes) => new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
+/** Unpack raw deflate; two bytes of it hold nothing. */
+export async function inflate(bytes) {
+  if (bytes.length < 3) return new Uint8Array(0);
+  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream('deflate-raw'));
+  return new Uint8Array(await new Response(stream).arrayBuffer());
+}
 
-/** Read the first 24 bytes: how long header and table are. */
+const view = (bytes) => new DataView(bytes.buffer, bytes.byteOffset);
+
+/** Read the first 24 bytes: how long header and table are together with them, and what the header needs. */
 export function readFixed(bytes) {
-  if (MAGIC.some((value, at) => bytes[at] !== value)) throw new StreamError('This is not an .esopm file.');
+  check(MAGIC.every((value, at) => bytes[at] === value), 'This is not an .esopm file.');
   const data = view(bytes);
-  const [version, flags] = [data.getUint16(8, true), data.getUint16(10, true)];
-  if (version !== 1 || flags) {
-    throw new StreamError(`The file has version ${version}.${flags}; this page knows version 1.0. Update the page.`);
-  }
-  const sizes = { header: data.getUint32(12, true), table: data.getUint32(16, true), crc: data.getUint32(20, true) };
-  if (sizes.header > 1 << 26 || sizes.table > 1 << 26) throw new StreamError('The header of the file is damaged.');
-  return sizes;
+  const [version, flags] = [8, 10].map((at) => data.getUint16(at, true));
+  check(version === 1 && !flags, `The file has version ${version}.${flags}; this page knows version 1.0. Update the page.`);
+  const [header, table, crc] = [12, 16, 20].map((at) => data.getUint32(at, true));
+  return { header, table, crc, end: FIXED + header + table };
 }
 
-/** Read header and table: { header, rows, end }, rows with begin, length, crc, places, faces, error, mesh. */
-export async function readHead(bytes, sizes) {
-  const body = bytes.subarray(FIXED, FIXED + sizes.header + sizes.table);
-  if (crc32(body) !== sizes.crc) throw new StreamError('The header of the file is damaged.');
-  let header;
-  try {
-    header = JSON.parse(new TextDecoder().decode(await inflate(body.subarray(0, sizes.header), 1 << 24)));
-  } catch {
-    throw new StreamError('The header of the file is damaged.');
-  }
+/** Read header and table: { header, meshes, rows, end }, rows with begin, length, crc, places, faces, error, mesh. */
+export async function readHead(bytes, { header: size, crc, end }) {
+  const body = bytes.subarray(FIXED, end);
+  check(crc32(body) === crc, 'The header of the file is damaged.');
+  const header = JSON.parse(new TextDecoder().decode(await inflate(body.subarray(0, size))));
   const { meshes } = header;
-  for (const mesh of meshes) {
-    const unknown = mesh.needs.filter((name) => !KNOWN.includes(name));
-    if (unknown.length) throw new StreamError(`The file needs what this page does not know: ${unknown}. Update the page.`);
-  }
-  const table = body.subarray(sizes.header);
-  const count = view(table).getUint32(0, true);
-  const raw = await inflate(table.subarray(4), count * ROW);
-  if (raw.length !== count * ROW) throw new StreamError('The table of the file is damaged.');
-  const plain = new Uint8Array(count * ROW);
-  for (let at = 0; at < ROW; at++) for (let row = 0; row < count; row++) plain[row * ROW + at] = raw[at * count + row];
-  const data = view(plain);
-  let begin = FIXED + sizes.header + sizes.table;
+  const unknown = meshes.flatMap((mesh) => mesh.needs).filter((name) => !KNOWN.includes(name));
+  check(!unknown.length, `The file needs what this page does not know: ${unknown}. Update the page.`);
+  const count = view(body).getUint32(size, true);
+  const planes = await inflate(body.subarray(size + 4));
+  check(planes.length === count * ROW);
+  const data = new DataView(planes.map((_, at) => planes[(at % ROW) * count + Math.floor(at / ROW)]).buffer);
   const rows = [];
   for (let at = 0; at < count * ROW; at += ROW) {
-    const [length, crc, places, faces] = [0, 4, 8, 12].map((field) => data.getUint32(at + field, true));
-    const mesh = data.getUint32(at + 20, true);
-    if (!meshes[mesh]) throw new StreamError('The table of the file is damaged.');
-    rows.push({ begin, length, crc, places, faces, error: data.getFloat32(at + 16, true), mesh });
-    begin += length;
+    const [length, crc, places, faces, , mesh] = [0, 4, 8, 12, 16, 20].map((field) => data.getUint32(at + field, true));
+    check(meshes[mesh]);
+    rows.push({ begin: end, length, crc, places, faces, error: data.getFloat32(at + 16, true), mesh });
+    end += length;
   }
-  return { header, meshes, rows, end: begin };
+  return { header, meshes, rows, end };
 }

@@ -1,181 +1,141 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The corners around a splitting place: which follows which, where its arc runs, and what that expects of the new place.
 import { bitLength } from './coder.js';
-import { StreamError } from './container.js';
+import { check } from './container.js';
 
+const STEP = 6; // numbers a corner in `ring`: three of its p; then
+const NEXT = 3; // its successor; where it has none, an end of the fan, which comes after the corners
+const LED = 4; // how many corners it is the successor of
 const HALVES = Float64Array.from({ length: 64 }, (_, n) => 2 ** -n);
-const damaged = (what) => new StreamError(`The file is damaged: ${what}.`);
 
-export class Fan {
-  constructor() {
-    this.split = 0;
-    this.room(64);
-  }
-
-  room(size) {
-    this.size = size;
-    this.p = new Int32Array(size);
-    this.next = new Int32Array(size);
-    this.linked = new Int32Array(size); // where each corner was last found to be a successor
-    // the ring's places at p and q of each corner, from the splitting place; twice the offset of their middle
-    for (const name of ['px', 'py', 'pz', 'qx', 'qy', 'qz']) this[name] = new Int32Array(size);
-    for (const name of ['ox', 'oy', 'oz', 'toward']) this[name] = new Float64Array(size);
-    this.score = new Float32Array(size);
-  }
-
-  /** Find the arcs of all splits, and mean, spread and normal of each one's ring. */
-  arcs(mesh, vertex, first, corners, length, rank) {
-    const k = vertex.length;
-    let total = 0;
-    for (let i = 0; i < k; i++) {
-      const degree = first[i + 1] - first[i];
-      if (degree > this.size) this.room(2 * degree);
-      if (length[i] > degree) throw damaged('a split leaves the surface');
-      if (rank[i] >= degree) throw damaged('a split starts nowhere');
-      total += length[i];
-    }
-    const out = {
-      length, arcFirst: new Int32Array(k + 1), arcCorner: new Int32Array(total), startCorner: new Int32Array(k),
-      lastCorner: new Int32Array(k), x: new Int32Array(k), y: new Int32Array(k), there: new Uint8Array(k).fill(3),
-      asked: [], askedContext: [], mean: new Int32Array(3 * k), normal: new Float64Array(3 * k), axis: new Uint8Array(k),
-      spread: new Int32Array(k), vertex, points: mesh.points,
-    };
-    const { points } = mesh;
-    const { shift } = mesh.geometry;
-    for (let i = 0; i < k; i++) {
-      const degree = first[i + 1] - first[i];
-      const closed = this.link(points, corners, first[i], degree, 4 * vertex[i], shift);
-      this.rate(degree, length[i]);
-      const start = this.nth(corners, 3 * first[i], degree, rank[i]);
-      this.walk(out, i, points, corners, 3 * first[i], degree, start, 4 * vertex[i], shift, closed);
-    }
-    return out;
-  }
+/**
+ * A function that follows the arcs of a batch's splits: their corners, their ends, and mean, spread and normal of each one's ring.
+ * `points` has four numbers a place; `shift` is the grid's.
+ */
+export function makeFan(points, shift) {
+  let size = 0; // corners that there is room for
+  let ring;
+  let toward;
+  let score;
 
   /**
-   * Link each corner to its successor, and fetch the ring. Each place's fourth number tells at which corner it was last
-   * met as p: so no search is needed. Says whether every corner has a successor and is one.
+   * Fetch the ring, and link each corner to its successor. Each place's fourth number tells at which corner it was last met
+   * as p: so no search is needed. Gives how many corners and ends there are.
    */
-  link(points, corners, first, degree, v, shift) {
-    const { p, next, linked, px, py, pz, qx, qy, qz, ox, oy, oz } = this;
-    const split = ++this.split;
-    const vx = points[v];
-    const vy = points[v + 1];
-    const vz = points[v + 2];
-    for (let c = 0, at = 3 * first + 1; c < degree; c++, at += 3) {
-      const place = corners[at];
-      p[c] = place;
-      const from = 4 * place;
-      px[c] = points[from];
-      py[c] = points[from + 1];
-      pz[c] = points[from + 2];
-      points[from + 3] = first + c;
+  function link(corners, first, degree) {
+    const found = ring;
+    for (let c = 0, r = 0, at = 3 * first + 1; c < degree; c++, r += STEP, at += 3) {
+      const p = 4 * corners[at];
+      found[r] = points[p];
+      found[r + 1] = points[p + 1];
+      found[r + 2] = points[p + 2];
+      found[r + LED] = 0;
+      points[p + 3] = c;
     }
-    let closed = true;
-    const cx = 2 * (vx >> shift);
-    const cy = 2 * (vy >> shift);
-    const cz = 2 * (vz >> shift);
+    let ends = degree;
     for (let c = 0, at = 3 * first + 2; c < degree; c++, at += 3) {
       const place = corners[at];
-      const from = 4 * place;
-      const x = points[from];
-      const y = points[from + 1];
-      const z = points[from + 2];
-      const met = points[from + 3] - first;
-      qx[c] = x;
-      qy[c] = y;
-      qz[c] = z;
-      ox[c] = (px[c] >> shift) + (x >> shift) - cx;
-      oy[c] = (py[c] >> shift) + (y >> shift) - cy;
-      oz[c] = (pz[c] >> shift) + (z >> shift) - cz;
-      if (met >= 0 && met < degree && p[met] === place) {
-        next[c] = met;
-        if (linked[met] === split) closed = false; // of two corners: then some other is of none
-        linked[met] = split;
-      } else {
-        next[c] = -1;
-        closed = false;
+      let next = points[4 * place + 3];
+      if (next < 0 || next >= degree || corners[3 * (first + next) + 1] !== place) {
+        next = ends++;
+        found[STEP * next] = points[4 * place];
+        found[STEP * next + 1] = points[4 * place + 1];
+        found[STEP * next + 2] = points[4 * place + 2];
+        found[STEP * next + LED] = -1;
       }
+      found[STEP * c + NEXT] = next;
+      found[STEP * next + LED]++;
     }
-    return closed;
+    return ends;
   }
 
   /** Score how likely an arc starts at each corner: how far its corners lie where the ring pulls the vertex. */
-  rate(degree, length) {
-    const { next, ox, oy, oz, toward, score } = this;
+  function rate(v, degree, ends, length) {
+    const found = ring;
+    const pull = toward;
+    const vx = points[v] >> shift;
+    const vy = points[v + 1] >> shift;
+    const vz = points[v + 2] >> shift;
     let x = 0;
     let y = 0;
     let z = 0;
-    for (let c = 0; c < degree; c++) {
-      x += ox[c];
-      y += oy[c];
-      z += oz[c];
+    for (let r = 0; r < STEP * ends; r += STEP) {
+      const times = found[r + LED] + 1; // an end counts once, a corner once more for each that it follows
+      x += times * ((found[r] >> shift) - vx);
+      y += times * ((found[r + 1] >> shift) - vy);
+      z += times * ((found[r + 2] >> shift) - vz);
     }
     x = Math.floor(x / degree);
     y = Math.floor(y / degree);
     z = Math.floor(z / degree);
-    for (let c = 0; c < degree; c++) toward[c] = x * ox[c] + y * oy[c] + z * oz[c];
+    for (let c = 0, r = 0; c < ends; c++, r += STEP) {
+      pull[c] = x * ((found[r] >> shift) - vx) + y * ((found[r + 1] >> shift) - vy) + z * ((found[r + 2] >> shift) - vz);
+    }
     const steps = length < 8 ? length : 8;
     for (let c = 0; c < degree; c++) {
-      let sum = toward[c];
-      for (let step = 1, d = next[c]; step < steps && d >= 0; step++, d = next[d]) sum += toward[d];
+      let d = found[STEP * c + NEXT];
+      let sum = pull[c] + pull[d];
+      for (let step = 1; step < steps && d < degree; step++) {
+        sum += pull[d];
+        d = found[STEP * d + NEXT];
+        sum += pull[d];
+      }
       score[c] = sum;
     }
   }
 
   /** The corner with the rank-th highest score; of equal ones the lower row first, then the lower face. */
-  nth(corners, first, degree, rank) {
-    const { score } = this;
-    const lower = (i, j) => {
-      const a = corners[first + 3 * i];
-      const b = corners[first + 3 * j];
-      return a % 3 !== b % 3 ? a % 3 < b % 3 : a < b;
+  function nth(corners, first, degree, rank) {
+    const rating = score;
+    const before = (a, b) => {
+      const i = corners[3 * (first + a)];
+      const j = corners[3 * (first + b)];
+      return i % 3 === j % 3 ? i < j : i % 3 < j % 3;
     };
     if (rank > 15) {
       const order = Array.from({ length: degree }, (_, c) => c);
-      return order.sort((i, j) => (score[i] !== score[j] ? score[j] - score[i] : lower(i, j) ? -1 : 1))[rank];
+      return order.sort((a, b) => rating[b] - rating[a] || (before(a, b) ? -1 : 1))[rank];
     }
-    let best = 0;
-    for (let c = 1; c < degree; c++) if (score[c] > score[best] || (score[c] === score[best] && lower(c, best))) best = c;
-    for (let round = 0; round < rank; round++) {
-      const before = best;
-      const limit = score[before];
-      best = -1;
-      for (let c = 0; c < degree; c++) {
-        if (score[c] > limit || c === before || (score[c] === limit && lower(c, before))) continue;
-        if (best < 0 || score[c] > score[best] || (score[c] === score[best] && lower(c, best))) best = c;
+    for (; ; rank--) {
+      let best = 0;
+      for (let c = 1; c < degree; c++) {
+        if (rating[c] > rating[best] || (rating[c] === rating[best] && before(c, best))) best = c;
       }
+      if (rank === 0) return best;
+      rating[best] = -Infinity;
     }
-    return best;
   }
 
-  /** Follow the arc from its start; write down its corners, its ends, and mean, spread and normal of the ring. */
-  walk(out, i, points, corners, first, degree, start, v, shift, closed) {
-    const { next, px, py, pz, qx, qy, qz } = this;
-    const { arcCorner } = out;
-    const steps = out.length[i];
+  /** Follow an arc from its start; write down its corners, its ends, and mean, spread and normal of its ring. */
+  function walk(arcs, i, corners, first, degree, start) {
+    const found = ring;
+    const { corner, mean } = arcs;
+    const steps = arcs.length[i];
+    const v = 4 * arcs.vertex[i];
     const vx = points[v];
     const vy = points[v + 1];
     const vz = points[v + 2];
-    const rx = px[start];
-    const ry = py[start];
-    const rz = pz[start];
+    let r = STEP * start;
+    let ax = (found[r] - vx) >> shift;
+    let ay = (found[r + 1] - vy) >> shift;
+    let az = (found[r + 2] - vz) >> shift;
     let nx = 0;
     let ny = 0;
     let nz = 0;
-    let sx = vx + rx;
-    let sy = vy + ry;
-    let sz = vz + rz;
-    let to = out.arcFirst[i];
+    let sx = vx + found[r];
+    let sy = vy + found[r + 1];
+    let sz = vz + found[r + 2];
+    let at = arcs.begin[i];
     let last = start;
-    for (let step = 0, c = start; step < steps; step++, c = next[c]) {
-      if (c < 0) throw damaged('a split leaves the surface');
-      const x = qx[c];
-      const y = qy[c];
-      const z = qz[c];
-      const ax = (px[c] - vx) >> shift;
-      const ay = (py[c] - vy) >> shift;
-      const az = (pz[c] - vz) >> shift;
+    for (let step = 0, c = start; step < steps; step++) {
+      check(c < degree && at < corner.length);
+      corner[at++] = corners[3 * (first + c)];
+      last = c;
+      c = found[r + NEXT];
+      r = STEP * c;
+      const x = found[r];
+      const y = found[r + 1];
+      const z = found[r + 2];
       const bx = (x - vx) >> shift;
       const by = (y - vy) >> shift;
       const bz = (z - vz) >> shift;
@@ -185,55 +145,55 @@ export class Fan {
       sx += x;
       sy += y;
       sz += z;
-      arcCorner[to++] = corners[first + 3 * c];
-      last = c;
+      ax = bx;
+      ay = by;
+      az = bz;
     }
-    out.arcFirst[i + 1] = to;
-    out.startCorner[i] = corners[first + 3 * start];
-    out.lastCorner[i] = corners[first + 3 * last];
-    out.x[i] = this.p[start];
-    out.y[i] = corners[first + 3 * last + 2];
-    if (!closed || steps === 0) this.ask(out, i, degree, start, last);
-    this.normal(out, i, nx, ny, nz);
-    const size = steps + 2;
-    const mx = Math.floor((2 * sx + size) / (2 * size));
-    const my = Math.floor((2 * sy + size) / (2 * size));
-    const mz = Math.floor((2 * sz + size) / (2 * size));
-    let sum = Math.abs(vx - mx) + Math.abs(vy - my) + Math.abs(vz - mz) + Math.abs(rx - mx) + Math.abs(ry - my) + Math.abs(rz - mz);
-    for (let step = 0, c = start; step < steps; step++, c = next[c]) {
-      sum += Math.abs(qx[c] - mx) + Math.abs(qy[c] - my) + Math.abs(qz[c] - mz);
+    arcs.begin[i + 1] = at;
+    arcs.start[i] = corners[3 * (first + start)];
+    arcs.last[i] = corners[3 * (first + last)];
+    arcs.x[i] = corners[3 * (first + start) + 1];
+    arcs.y[i] = corners[3 * (first + last) + 2];
+    // at the end of a fan a split says which faces open
+    const isFirst = found[STEP * start + LED] === 0;
+    const isLast = found[STEP * last + NEXT] >= degree;
+    if (isFirst || isLast || steps === 0) arcs.asked.push(i, steps === 0 ? 2 : isFirst && isLast ? 1 : 0);
+    lean(arcs, i, nx, ny, nz);
+    const count = 2 * (steps + 2);
+    const mx = (mean[3 * i] = Math.floor((2 * sx + steps + 2) / count));
+    const my = (mean[3 * i + 1] = Math.floor((2 * sy + steps + 2) / count));
+    const mz = (mean[3 * i + 2] = Math.floor((2 * sz + steps + 2) / count));
+    let sum = Math.abs(vx - mx) + Math.abs(vy - my) + Math.abs(vz - mz);
+    r = STEP * start;
+    for (let step = 0; step <= steps; step++, r = STEP * found[r + NEXT]) {
+      sum += Math.abs(found[r] - mx) + Math.abs(found[r + 1] - my) + Math.abs(found[r + 2] - mz);
     }
-    out.mean[3 * i] = mx;
-    out.mean[3 * i + 1] = my;
-    out.mean[3 * i + 2] = mz;
-    out.spread[i] = Math.floor(sum / size);
+    arcs.spread[i] = Math.floor((2 * sum) / count);
   }
 
-  /** Note that a split at the end of a fan says which faces open. */
-  ask(out, i, degree, start, last) {
-    const { next } = this;
-    let isFirst = true; // no corner's successor
-    for (let c = 0; c < degree; c++) if (next[c] === start) isFirst = false;
-    const isLast = next[last] < 0;
-    const bare = out.length[i] === 0;
-    if (!isFirst && !isLast && !bare) return;
-    out.asked.push(i);
-    out.askedContext.push(bare ? 2 : isFirst && isLast ? 1 : 0);
-  }
-
-  /** Keep twelve bits of a normal, and the axis along which it is largest. */
-  normal(out, i, x, y, z) {
-    const longest = Math.max(Math.abs(x), Math.abs(y), Math.abs(z));
-    if (longest >= 4096) {
-      const scale = HALVES[bitLength(longest) - 12];
-      x = Math.floor(x * scale);
-      y = Math.floor(y * scale);
-      z = Math.floor(z * scale);
+  return (arcs, first, corners, rank) => {
+    for (let i = 0; i < rank.length; i++) {
+      const degree = first[i + 1] - first[i];
+      if (degree > size) {
+        size = 2 * degree;
+        ring = new Int32Array(2 * STEP * size);
+        toward = new Float64Array(2 * size);
+        score = new Float32Array(size);
+      }
+      check(rank[i] < degree);
+      const ends = link(corners, first[i], degree);
+      rate(4 * arcs.vertex[i], degree, ends, arcs.length[i]);
+      walk(arcs, i, corners, first[i], degree, nth(corners, first[i], degree, rank[i]));
     }
-    out.normal[3 * i] = x;
-    out.normal[3 * i + 1] = y;
-    out.normal[3 * i + 2] = z;
-    const a = Math.abs(y) > Math.abs(x) ? 1 : 0;
-    out.axis[i] = Math.abs(z) > Math.abs(a ? y : x) ? 2 : a;
-  }
+  };
+}
+
+/** Keep twelve bits of a normal, and the axis along which it is largest. */
+function lean({ normal, axis }, i, x, y, z) {
+  const longest = Math.max(Math.abs(x), Math.abs(y), Math.abs(z));
+  const scale = longest < 4096 ? 1 : HALVES[bitLength(longest) - 12];
+  const a = Math.abs((normal[3 * i] = Math.floor(x * scale)));
+  const b = Math.abs((normal[3 * i + 1] = Math.floor(y * scale)));
+  const c = Math.abs((normal[3 * i + 2] = Math.floor(z * scale)));
+  axis[i] = c > a && c > b ? 2 : b > a ? 1 : 0;
 }

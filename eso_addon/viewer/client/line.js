@@ -1,82 +1,66 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Where the bytes come from: byte ranges of a file on a server, or bytes that the page holds.
+import { StreamError } from './container.js';
 
-/** What went wrong on the line; `again`: asking once more may help. */
-export class LineError extends Error {
-  constructor(message, again) {
-    super(message);
-    this.again = again;
-  }
-}
+const broken = () => new StreamError('The connection broke off.', true);
 
-export class Line {
-  constructor(url) {
-    this.url = url;
-    this.ranges = true; // until the server refuses them
-    this.size = 0; // of the file, 0 while unknown
-  }
+/** A file on a server: { read, ranges, size }. */
+export function makeLine(url) {
+  const line = { read, ranges: true, size: 0 }; // until the server refuses ranges; 0 while unknown
+  let tag;
 
-  /** Yield the bytes from `begin` up to `end`, which may be Infinity; past it where the server knows no ranges. */
-  async *read(begin, end, signal) {
-    const headers = { Range: `bytes=${begin}-${end < Infinity ? end - 1 : ''}` };
-    if (this.tag && begin) headers['If-Range'] = this.tag;
-    const response = await this.ask(headers, signal);
+  /** Yield the bytes from `begin` up to `end`; up to the last one where the server knows no ranges. */
+  async function* read(begin, end, signal) {
+    const response = await ask(`bytes=${begin}-${end - 1}`, signal);
     const reader = response.body.getReader();
-    let skip = this.ranges ? 0 : begin;
-    let at = begin;
+    let at = line.ranges ? begin : 0;
     try {
       for (;;) {
         const { done, value } = await reader.read().catch(() => {
-          throw new LineError('The connection broke off.', true);
+          throw broken();
         });
         if (done) break;
-        const part = value.subarray(Math.min(skip, value.length));
-        skip -= value.length - part.length;
-        if (!part.length) continue;
-        at += part.length;
-        yield part;
+        at += value.length;
+        if (at > begin) yield value.subarray(Math.max(value.length - at + begin, 0));
+        begin = Math.max(begin, at);
       }
     } finally {
       reader.cancel().catch(() => {});
     }
-    if (at < Math.min(end, this.size || Infinity) && end < Infinity) throw new LineError('The connection broke off.', true);
+    if (begin < (line.ranges ? Math.min(end, line.size || end) : line.size)) throw broken();
   }
 
-  async ask(headers, signal) {
-    let response;
-    try {
-      response = await fetch(this.url, { headers, signal, cache: 'no-store' });
-    } catch {
-      throw new LineError('The server does not answer.', true);
-    }
+  async function ask(Range, signal) {
+    const headers = { Range };
+    if (tag) headers['If-Range'] = tag;
+    const response = await fetch(url, { headers, signal, cache: 'no-store' }).catch(() => {
+      throw new StreamError('The server does not answer.', true);
+    });
     const { status } = response;
-    if (status === 416) throw new LineError('The file is cut short on the server.', false);
+    const header = (name) => response.headers.get(name) ?? '';
     if (!response.ok) {
-      const gone = status === 404 || status === 410;
-      const text = gone ? `There is no such file on the server (${status}).` : `The server refuses the file (${status}).`;
-      throw new LineError(text, status >= 500 || status === 408 || status === 429);
+      const text = { 404: 'There is no such file on the server', 416: 'The file is cut short on the server' }[status];
+      throw new StreamError(`${text ?? 'The server refuses the file'} (${status}).`, status >= 500 || status === 429);
     }
-    const tag = response.headers.get('ETag');
-    if (this.tag && tag && tag !== this.tag) throw new LineError('The file on the server has changed: load the page anew.', false);
-    if (tag && !tag.startsWith('W/')) this.tag = tag;
-    this.ranges = status === 206;
-    const total = this.ranges ? (response.headers.get('Content-Range') ?? '').split('/')[1] : response.headers.get('Content-Length');
-    if (Number(total) && !response.headers.get('Content-Encoding')) this.size = Number(total);
+    const fresh = header('ETag');
+    if (tag && fresh && fresh !== tag) throw new StreamError('The file on the server has changed: load the page anew.');
+    if (!fresh.startsWith('W/')) tag = fresh;
+    line.ranges = status === 206;
+    const total = Number(line.ranges ? header('Content-Range').split('/')[1] : header('Content-Length'));
+    if (total && !header('Content-Encoding')) line.size = total;
     return response;
   }
+
+  return line;
 }
 
-/** Bytes that the page itself holds. */
-export class Held {
-  constructor(bytes) {
-    this.bytes = bytes;
-    this.size = bytes.length;
-    this.ranges = true;
-  }
-
-  async *read(begin, end) {
-    const stop = Math.min(end, this.size);
-    if (begin >= stop) throw new LineError('The file is cut short.', false);
-    for (let at = begin; at < stop; at += 1 << 16) yield this.bytes.subarray(at, Math.min(at + (1 << 16), stop));
-  }
+/** The same of bytes that the page itself holds. */
+export function makeHeld(bytes) {
+  return {
+    ranges: true,
+    size: bytes.length,
+    async* read(begin, end) {
+      for (; begin < Math.min(end, bytes.length); begin += 65536) yield bytes.subarray(begin, Math.min(begin + 65536, end));
+    },
+  };
 }

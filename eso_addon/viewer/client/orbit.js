@@ -2,107 +2,106 @@
 // The camera's way around the model: one finger or the left button turns, two fingers or the right button move,
 // pinch and wheel come closer; arrow keys turn, plus and minus come closer.
 
-export class Orbit {
-  /** `moved` is called after each change. */
-  constructor(canvas, moved) {
-    Object.assign(this, { canvas, moved, pointers: new Map() });
-    this.target = [0, 0, 0];
-    this.azimuth = 0.55;
-    this.height = 0.35;
-    this.distance = 3;
-    this.radius = 1;
-    canvas.style.touchAction = 'none';
-    canvas.addEventListener('contextmenu', (event) => event.preventDefault());
-    canvas.addEventListener('pointerdown', (event) => this.down(event));
-    canvas.addEventListener('pointermove', (event) => this.drag(event));
-    for (const name of ['pointerup', 'pointercancel']) canvas.addEventListener(name, (event) => this.pointers.delete(event.pointerId));
-    canvas.addEventListener('wheel', (event) => {
-      event.preventDefault();
-      const lines = event.deltaMode === 1 ? 16 : 1;
-      this.zoom(Math.exp(Math.max(-90, Math.min(event.deltaY * lines, 90)) * 0.002));
-    }, { passive: false });
-    canvas.addEventListener('dblclick', () => this.home());
-    canvas.addEventListener('keydown', (event) => this.key(event));
-  }
+const limit = (value, low, high) => Math.max(low, Math.min(value, high));
+
+/** An object with target, azimuth, height and distance; `moved` is called after each change. */
+export function makeOrbit(canvas, fov, moved) {
+  const slope = Math.tan((fov * Math.PI) / 360);
+  const pointers = new Map();
+  const orbit = { target: [0, 0, 0], azimuth: 0.55, height: 0.35, distance: 3, radius: 1, free: 1, home, moved, frame, aim };
+  let start;
 
   /** Look at a ball from the front, a little from the side and above. */
-  frame(center, radius) {
-    this.radius = radius;
-    this.start = { target: [...center], distance: this.fit(radius) };
-    this.home();
+  function frame(center, radius) {
+    const aspect = Math.min(orbit.free, canvas.clientWidth / canvas.clientHeight || 1);
+    orbit.radius = radius;
+    start = { target: center, distance: (radius * 1.05) / Math.sin(Math.atan(slope * aspect)), azimuth: 0.55, height: 0.35 };
+    home();
   }
 
-  fit(radius) {
-    const aspect = Math.min(this.free ?? 1, this.canvas.clientWidth / Math.max(this.canvas.clientHeight, 1)) || 1;
-    return (radius * 1.05) / Math.sin(Math.atan(Math.tan((this.fov ?? 35) * (Math.PI / 360)) * aspect));
+  function home() {
+    Object.assign(orbit, start, { target: [...(start?.target ?? orbit.target)] });
+    moved();
   }
 
-  home() {
-    if (!this.start) return;
-    Object.assign(this, { target: [...this.start.target], distance: this.start.distance, azimuth: 0.55, height: 0.35 });
-    this.moved();
+  function turn(dx, dy) {
+    const scale = 4 / Math.max(Math.min(canvas.clientWidth, canvas.clientHeight), 200);
+    orbit.azimuth -= dx * scale;
+    orbit.height = limit(orbit.height + dy * scale, -1.55, 1.55);
+    moved();
   }
 
-  down(event) {
-    this.canvas.setPointerCapture(event.pointerId);
-    this.canvas.focus({ preventScroll: true });
-    this.pointers.set(event.pointerId, [event.clientX, event.clientY]);
+  function shift(dx, dy) {
+    const scale = (2 * orbit.distance * slope) / (canvas.clientHeight || 1);
+    const [right, up] = axes();
+    orbit.target = orbit.target.map((value, i) => value + scale * (up[i] * dy - right[i] * dx));
+    moved();
   }
 
-  drag(event) {
-    const before = this.pointers.get(event.pointerId);
-    if (!before) return;
-    const at = [event.clientX, event.clientY];
-    const [dx, dy] = [at[0] - before[0], at[1] - before[1]];
-    if (this.pointers.size === 1) {
-      if (event.buttons & 6 || event.shiftKey) this.shift(dx, dy);
-      else this.turn(dx, dy);
-    } else {
-      const other = [...this.pointers].find(([id]) => id !== event.pointerId)[1];
-      const apart = (point) => Math.hypot(point[0] - other[0], point[1] - other[1]) || 1;
-      this.zoom(apart(before) / apart(at));
-      this.shift(dx / 2, dy / 2);
-    }
-    this.pointers.set(event.pointerId, at);
+  function zoom(factor) {
+    orbit.distance = limit(orbit.distance * factor, orbit.radius * 0.02, orbit.radius * 60);
+    moved();
   }
 
-  turn(dx, dy) {
-    const scale = 4 / Math.max(Math.min(this.canvas.clientWidth, this.canvas.clientHeight), 200);
-    this.azimuth -= dx * scale;
-    this.height = Math.max(-1.55, Math.min(this.height + dy * scale, 1.55));
-    this.moved();
+  /** The picture's right and up and what it looks away from, in the scene, Y up. */
+  function axes() {
+    const [x, y] = [orbit.azimuth, orbit.height].map(Math.cos);
+    const [a, h] = [orbit.azimuth, orbit.height].map(Math.sin);
+    return [[x, 0, -a], [-a * h, y, -x * h], [a * y, h, x * y]];
   }
 
-  shift(dx, dy) {
-    const scale = (2 * this.distance * Math.tan((this.fov ?? 35) * (Math.PI / 360))) / Math.max(this.canvas.clientHeight, 1);
-    const [right, up] = this.axes();
-    for (let i = 0; i < 3; i++) this.target[i] += scale * (up[i] * dy - right[i] * dx);
-    this.moved();
+  /** Put the camera where it belongs. */
+  function aim(camera) {
+    const [, up, back] = axes();
+    const { target, distance, radius } = orbit;
+    camera.position.fromArray(target.map((value, i) => value + distance * back[i]));
+    camera.up.fromArray(up);
+    camera.lookAt(...target);
+    camera.far = distance + 4 * radius;
+    camera.near = Math.max(distance - 3 * radius, camera.far / 5000);
+    camera.updateProjectionMatrix();
+    camera.updateMatrixWorld();
   }
 
-  zoom(factor) {
-    this.distance = Math.max(this.radius * 0.02, Math.min(this.distance * factor, this.radius * 60));
-    this.moved();
+  const keys = {
+    ArrowLeft: () => turn(-20, 0), ArrowRight: () => turn(20, 0), ArrowUp: () => turn(0, -20), ArrowDown: () => turn(0, 20),
+    '+': () => zoom(0.9), '=': () => zoom(0.9), '-': () => zoom(1.1), Home: home,
+  };
+  const actions = {
+    contextmenu() {},
+    pointerdown({ pointerId, clientX, clientY }) {
+      canvas.setPointerCapture(pointerId);
+      canvas.focus({ preventScroll: true });
+      pointers.set(pointerId, [clientX, clientY]);
+    },
+    pointermove({ pointerId, clientX: x, clientY: y, buttons, shiftKey }) {
+      const before = pointers.get(pointerId);
+      if (!before) return;
+      pointers.set(pointerId, [x, y]);
+      const [dx, dy] = [x - before[0], y - before[1]];
+      const other = [...pointers].find(([id]) => id !== pointerId)?.[1];
+      if (other) {
+        const apart = (point) => Math.hypot(point[0] - other[0], point[1] - other[1]) || 1;
+        zoom(apart(before) / apart([x, y]));
+        shift(dx / 2, dy / 2);
+      } else if (buttons & 6 || shiftKey) shift(dx, dy);
+      else turn(dx, dy);
+    },
+    pointerup: ({ pointerId }) => pointers.delete(pointerId),
+    pointercancel: ({ pointerId }) => pointers.delete(pointerId),
+    wheel: ({ deltaY, deltaMode }) => zoom(Math.exp(limit(deltaY * (deltaMode ? 16 : 1), -90, 90) * 0.002)),
+    dblclick: home,
+  };
+  for (const [name, act] of Object.entries(actions)) {
+    canvas.addEventListener(name, (event) => {
+      if (name === 'wheel' || name === 'contextmenu') event.preventDefault();
+      act(event);
+    });
   }
-
-  key(event) {
-    const step = { ArrowLeft: [-20, 0], ArrowRight: [20, 0], ArrowUp: [0, -20], ArrowDown: [0, 20] }[event.key];
-    if (step) this.turn(...step);
-    else if (event.key === '+' || event.key === '=') this.zoom(0.9);
-    else if (event.key === '-') this.zoom(1.1);
-    else if (event.key === 'Home') this.home();
-    else return;
+  canvas.addEventListener('keydown', (event) => {
+    if (!keys[event.key]) return;
     event.preventDefault();
-  }
-
-  /** The picture's right and up in the scene, Y up. */
-  axes() {
-    const { azimuth: a, height: h } = this;
-    return [[Math.cos(a), 0, -Math.sin(a)], [-Math.sin(a) * Math.sin(h), Math.cos(h), -Math.cos(a) * Math.sin(h)]];
-  }
-
-  position() {
-    const { azimuth: a, height: h, distance: d, target: t } = this;
-    return [t[0] + d * Math.sin(a) * Math.cos(h), t[1] + d * Math.sin(h), t[2] + d * Math.cos(a) * Math.cos(h)];
-  }
+    keys[event.key]();
+  });
+  return orbit;
 }

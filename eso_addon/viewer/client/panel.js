@@ -2,132 +2,106 @@
 // Buttons, slider, figures and messages around the picture.
 import { STYLE } from './style.js';
 
-const icon = (path) => `<svg viewBox="0 0 24 24" aria-hidden="true">${path}</svg>`;
-const PAUSE = icon('<path d="M9 5v14M15 5v14"/>');
-const PLAY = icon('<path d="M8 5l11 7-11 7z"/>');
-const BASE = icon('<path d="M12 4l8 14H4z"/>');
-const WHOLE = icon('<path d="M12 4l8 14H4zM12 4v14M8 11h8M8 11l4 7 4-7"/>');
-const WIRE = icon('<path d="M12 3l8 4.5v9L12 21l-8-4.5v-9zM12 12l8-4.5M12 12v9M12 12L4 7.5"/>');
-const GEAR = icon('<path d="M4 7h9M17 7h3M4 17h3M11 17h9"/><circle cx="15" cy="7" r="2"/><circle cx="9" cy="17" r="2"/>');
+const icon = (path) => `<svg viewBox="0 0 24 24"><path d="${path}"/></svg>`;
+const PAUSE = icon('M9 5v14M15 5v14');
+const PLAY = icon('M8 5l11 7-11 7z');
 
-const button = (name, label, content, more = '') =>
-  `<button type="button" class="${name}" title="${label}" aria-label="${label}" ${more}>${content}</button>`;
+const button = (name, label, content) => `<button class="${name}" title="${label}">${content}</button>`;
 const select = (name, label, options) =>
-  `<label>${label}<select name="${name}">${options.map(([value, text]) => `<option value="${value}">${text}</option>`).join('')}</select></label>`;
+  `<label>${label}<select name="${name}">${options.map(([value, text]) => `<option value="${value}">${text}`).join('')}</select></label>`;
 const figure = (name, label) => `<div><dt>${label}</dt><dd class="${name}">–</dd></div>`;
 
+export const bytesText = (bytes) =>
+  bytes < 1000 ? `${bytes} B` : bytes < 1e6 ? `${(bytes / 1e3).toPrecision(3)} kB` : `${(bytes / 1e6).toPrecision(3)} MB`;
+const UNITS = { budget: (value) => `${bytesText(value)}/s`, frame: (value) => `${value} ms`, error: (value) => `${value} px` };
+const numbers = (name, label, none, values) => select(name, label, [[0, none], ...values.map((value) => [value, UNITS[name](value)])]);
+
 const BODY = `<style>${STYLE}</style>
-<canvas tabindex="0" role="img" aria-label="The model: drag to turn, pinch or wheel to come closer, arrow keys turn"></canvas>
-<div class="title"><b></b><span class="state" role="status"></span></div>
-<div class="message card" role="alert" hidden><span></span>${button('again', 'Try again', 'Try again')}</div>
+<canvas tabindex="0" role="img"></canvas>
+<header><b></b> <span class="state" role="status"></span></header>
+<div class="message card" role="alert" hidden><span></span>${button('again', 'Load once more', 'Try again')}</div>
 <div class="bar card">
-<div class="row">${button('play', 'Pause loading', PAUSE)}${button('base', 'Back to the base', BASE)}
-<div class="slide"><i></i><input class="level" type="range" min="0" max="1000" value="1000" aria-label="Level of detail"></div>
-${button('whole', 'All that there is', WHOLE)}${button('wire', 'Show the triangles', WIRE, 'aria-pressed="false"')}
-${button('more', 'Settings', GEAR, 'aria-expanded="false"')}</div>
+<div class="row">${button('play', '', '')}${button('base', 'Back to the base', icon('M12 4l8 14H4z'))}
+<input class="level" type="range" max="1000" aria-label="Level of detail">
+${button('whole', 'All that there is', icon('M12 4l8 14H4zv14M8 11h8l-4 7z'))}
+${button('wire', 'Show the triangles', icon('M12 3l8 4.5v9L12 21l-8-4.5v-9zM4 7.5l8 4.5 8-4.5M12 12v9'))}
+${button('more', 'Settings', icon('M4 8h9m5 0h2M4 16h2m5 0h9M13 5v6h5V5zM6 13v6h5v-6z'))}</div>
 <dl>${figure('bytes', 'Received')}${figure('triangles', 'Triangles')}${figure('splits', 'Splits a second')}${figure('error', 'Error')}</dl>
-<div class="load" role="progressbar" aria-label="Received"><i></i></div>
-<form class="settings" hidden>
-${select('budget', 'Line, at most', [[0, 'as fast as it goes'], [5e4, '50 kB/s'], [1e5, '100 kB/s'], [25e4, '250 kB/s'], [1e6, '1 MB/s'], [4e6, '4 MB/s']])}
-${select('frame', 'Time of a picture', [[0, 'does not matter'], [16, 'at most 16 ms'], [33, 'at most 33 ms'], [50, 'at most 50 ms'], [100, 'at most 100 ms']])}
-${select('error', 'Error on screen', [[0, 'none: the original'], [0.5, 'half a pixel'], [1, '1 pixel'], [2, '2 pixels'], [5, '5 pixels']])}
+<progress max="1"></progress>
+<form hidden>
+${numbers('budget', 'Line, at most', 'as fast as it goes', [5e4, 1e5, 25e4, 1e6, 4e6])}
+${numbers('frame', 'Time of a picture', 'does not matter', [16, 33, 50, 100])}
+${numbers('error', 'Error on screen', 'none: the original', [0.5, 1, 2, 5])}
 ${select('colours', 'Colours', [['material', 'as given'], ['plain', 'clay'], ['uv', 'UV map']])}
 ${select('shading', 'Shading', [['smooth', 'as given'], ['flat', 'flat']])}
 ${select('up', 'Up', [['z', 'Z'], ['y', 'Y']])}
 </form></div>`;
 
-export const bytesText = (bytes) =>
-  bytes < 1000 ? `${bytes} B` : bytes < 1e6 ? `${(bytes / 1e3).toPrecision(3)} kB` : `${(bytes / 1e6).toPrecision(3)} MB`;
-export const countText = (count) => Math.round(count).toLocaleString('en').replaceAll(',', '\u202f');
-const pixelText = (pixels) => (pixels < 0 ? '–' : pixels === 0 ? '0 px' : `${pixels < 0.01 ? '<\u2009' : ''}${Math.max(pixels, 0.01).toPrecision(2)} px`);
+const countText = (count) => Math.round(count).toLocaleString('en').replaceAll(',', '\u202f');
+const pixelText = (pixels) => (pixels < 0 ? '–' : pixels && pixels < 0.01 ? '<\u2009.01 px' : `${Number(pixels.toPrecision(2))} px`);
 
-export class Panel {
-  /** `act`: { play, level, wire, set, again }, what to do when someone asks for it. */
-  constructor(root, act) {
-    root.innerHTML = BODY;
-    this.root = root;
-    const find = (selector) => root.querySelector(selector);
-    this.find = find;
-    this.canvas = find('canvas');
-    find('.play').onclick = () => act.play();
-    find('.base').onclick = () => act.level(0);
-    find('.whole').onclick = () => act.level(1);
-    find('.level').oninput = (event) => act.level(event.target.value / 1000);
-    find('.wire').onclick = () => act.wire();
-    find('.again').onclick = () => act.again();
-    find('.more').onclick = () => this.open(find('.settings').hidden);
-    find('.settings').onchange = (event) => act.set(event.target.name, event.target.value);
-  }
+/** Fill the element's shadow; `act`: { play, level, wire, set, again }, what to do when someone asks for it. */
+export function makePanel(root, act) {
+  root.innerHTML = BODY;
+  const find = (selector) => root.querySelector(selector);
+  const form = find('form');
+  const canvas = find('canvas');
+  find('.play').onclick = act.play;
+  find('.base').onclick = () => act.level(0);
+  find('.whole').onclick = () => act.level(1);
+  find('.level').oninput = ({ target }) => act.level(target.value / 1000);
+  find('.wire').onclick = act.wire;
+  find('.again').onclick = act.again;
+  find('.more').onclick = () => press('.more', !(form.hidden = !form.hidden));
+  form.onchange = ({ target }) => act.set(target.name, target.value);
 
-  /** Pixels that the bar takes at the bottom, without its settings. */
-  height() {
-    const settings = this.find('.settings');
-    return this.find('.bar').offsetHeight + 14 - (settings.hidden ? 0 : settings.offsetHeight + 12);
-  }
+  const press = (selector, on) => find(selector).setAttribute('aria-pressed', on);
 
-  open(on) {
-    this.find('.settings').hidden = !on;
-    this.find('.more').setAttribute('aria-expanded', on);
-  }
+  return {
+    canvas,
 
-  /** Show a setting's value, which the list may not have. */
-  setting(name, value) {
-    const field = this.find(`[name=${name}]`);
-    if (!field) return;
-    if (![...field.options].some((option) => option.value === String(value))) {
-      const text = { budget: `${bytesText(value)}/s`, frame: `at most ${value} ms`, error: `${value} pixels` }[name];
-      if (!text) return;
-      field.add(new Option(text, value));
-    }
-    field.value = value;
-  }
+    /** Pixels that the bar takes at the bottom, without its settings. */
+    height: () => find('.bar').offsetHeight - form.offsetHeight + 14,
 
-  paused(on) {
-    const play = this.find('.play');
-    play.innerHTML = on ? PLAY : PAUSE;
-    play.title = on ? 'Go on loading' : 'Pause loading';
-    play.setAttribute('aria-label', play.title);
-  }
+    /** Show a setting's value, which the list may not have. */
+    setting(name, value) {
+      const field = form.elements[name];
+      if (name === 'level') find('.level').value = 1000 * value;
+      if (name === 'wire') press('.wire', value);
+      if (name === 'paused') {
+        find('.play').innerHTML = value ? PLAY : PAUSE;
+        find('.play').title = value ? 'Go on loading' : 'Pause loading';
+      }
+      if (!field) return;
+      field.value = value;
+      if (field.selectedIndex >= 0 || !UNITS[name]) return;
+      field.add(new Option(UNITS[name](value), value, true, true));
+    },
 
-  wire(on) {
-    this.find('.wire').setAttribute('aria-pressed', on);
-  }
+    title(name) {
+      find('b').textContent = name;
+      canvas.ariaLabel = `${name}: drag to turn, pinch or wheel to come closer, arrow keys turn`;
+    },
 
-  title(name) {
-    this.find('b').textContent = name;
-    this.canvas.setAttribute('aria-label', `${name}: drag to turn, pinch or wheel to come closer, arrow keys turn`);
-  }
+    message(text, again) {
+      find('.message').hidden = !text;
+      find('.message span').textContent = text;
+      find('.again').hidden = !again;
+    },
 
-  state(text, same = false) {
-    const state = this.find('.state');
-    if (state.textContent !== text) state.textContent = text;
-    state.classList.toggle('same', same);
-    this.find('.bar').classList.toggle('same', same);
-  }
-
-  message(text, again = true) {
-    this.find('.message').hidden = !text;
-    this.find('.message span').textContent = text;
-    this.find('.again').hidden = !again;
-  }
-
-  /** Bytes, triangles, splits a second, error; and how far the slider's track is filled. */
-  figures({ received, bytes, shown, faces, rate, pixels, base, level }) {
-    const { find } = this;
-    const put = (name, value, rest = '') => {
-      const html = `${value}${rest ? ` <small>${rest}</small>` : ''}`;
-      if (find(name).innerHTML !== html) find(name).innerHTML = html;
-    };
-    put('.bytes', bytesText(received), bytes ? `of ${bytesText(bytes)}` : '');
-    put('.triangles', countText(shown), `of ${countText(faces)}`);
-    put('.splits', rate ? countText(Number(rate.toPrecision(2))) : '–');
-    put('.error', pixelText(pixels));
-    const part = (count) => (faces > base ? (100 * Math.log(Math.max(count, base) / base)) / Math.log(faces / base) : 100);
-    const slide = find('.slide');
-    slide.style.setProperty('--shown', `${part(shown).toFixed(1)}%`);
-    slide.style.setProperty('--there', `${part(level).toFixed(1)}%`);
-    const got = bytes ? Math.min(100, (100 * received) / bytes) : 0;
-    find('.load').style.setProperty('--got', `${got.toFixed(1)}%`);
-    find('.load').setAttribute('aria-valuenow', Math.round(got));
-  }
+    /** Bytes, triangles, splits a second, error; and how all is going. */
+    figures({ received, bytes, shown, faces, rate, pixels, seconds }, text, same) {
+      const put = (selector, html) => {
+        if (find(selector).innerHTML !== html) find(selector).innerHTML = html;
+      };
+      put('.state', text);
+      put('.bytes', `${bytesText(received)} <small>of ${bytesText(bytes)}</small>`);
+      put('.triangles', `${countText(shown)} <small>of ${countText(faces)}</small>`);
+      put('.splits', rate ? countText(Number(rate.toPrecision(2))) : '–');
+      put('.error', pixelText(pixels).replace('<', '&lt;'));
+      find('progress').value = bytes && received / bytes;
+      find('.play').disabled = Boolean(seconds);
+      find('.state').classList.toggle('same', same);
+    },
+  };
 }

@@ -1,442 +1,353 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A file on its way in: asks for as much as is wanted, decodes it, and tells which level of each mesh to show.
-import { FIXED, StreamError, crc32, readFixed, readHead } from './container.js';
+import { FIXED, StreamError, check, crc32, readFixed, readHead } from './container.js';
 import { digest } from './finest.js';
-import { LineError } from './line.js';
 import { Mesh } from './mesh.js';
 
 const FIRST = 8192; // bytes asked for at first: the first picture comes from them
 const PATIENCE = 400; // milliseconds that the first picture waits for more than the base
-const QUIET = 120; // milliseconds at least between pictures while more comes, where the next has four times as much
-const LONG = 400; // and at most
-const STEP = 250; // milliseconds between steps where a slow line makes a batch's splits last until the next
+const STEP = 250; // milliseconds between pictures while more comes
 const now = () => performance.now();
 const { port1, port2 } = new MessageChannel();
 const breath = () => new Promise((resolve) => { port1.onmessage = resolve; port2.postMessage(0); });
 
-export class Stream {
-  /** `tell`: takes { type, ... } messages for the page. */
-  constructor(line, tell) {
-    this.line = line;
-    this.tell = tell;
-    this.wish = { paused: false, budget: 0, error: 0, faces: Infinity, cap: Infinity, memory: Infinity, views: [] };
-    this.received = this.decoded = this.splits = 0;
-    this.begun = now();
-    this.busy = 0; // milliseconds spent on splits
-    this.tokens = 0;
-    this.speed = 0; // bytes a second, as measured
-    this.first = new Uint8Array(0);
-    this.shown = 0; // triangles of all meshes in the last picture
-    this.levels = [];
-    this.changed = new Set();
-  }
+/**
+ * Load what `line` gives, as `wish` says, for as long as the page lives. `show` is given the places of each mesh in a new level
+ * (-1: as before), and of the first one what it took; `tell` takes { type, ... } messages for the page.
+ */
+export function makeStream(line, wish, show, tell) {
+  const begun = now();
+  const waiting = new Set();
+  let file = new Uint8Array(FIRST);
+  let head;
+  let rows = [];
+  let meshes = [];
+  let received = 0;
+  let splits = 0;
+  let busy = 0; // milliseconds spent on splits
+  let paid = 0; // until when the budget is spent
+  let pace = { time: begun, bytes: 0 };
+  let speed = 0; // bytes a second
+  let abort;
+  let troubled = false;
+  let retry;
+  let based; // when the base was there
+  let levels = []; // places of each mesh in the last picture
+  let shown = 0; // their triangles
+  let drawing = false;
+  let posted = -STEP;
+  let timer;
+  let told = 0;
+  let whole = {};
+  let breathed = 0;
 
   /** Take new wishes of the page. */
-  want(wish) {
-    Object.assign(this.wish, wish);
-    if (wish.paused || wish.budget !== undefined) this.abort?.abort(); // of other wishes the next part asks
-    if (wish.faces !== undefined || wish.cap !== undefined) this.hurry = true;
-    this.wake();
-    this.present();
+  function want(wishes) {
+    Object.assign(wish, wishes);
+    // of other wishes the next part asks; without ranges the line is held, not left
+    if (line.ranges && (wishes.paused || 'budget' in wishes)) abort?.abort();
+    wake();
+    present('level' in wishes || 'cap' in wishes);
   }
 
-  wake() {
-    for (const resolve of this.changed) resolve();
-    this.changed.clear();
+  function wake() {
+    for (const resolve of waiting) resolve();
+    waiting.clear();
   }
 
   /** Wait until something is said, or so many milliseconds. */
-  change(milliseconds) {
-    return new Promise((resolve) => {
-      this.changed.add(resolve);
-      if (milliseconds) setTimeout(resolve, milliseconds);
-    });
-  }
+  const change = (milliseconds) => new Promise((resolve) => {
+    waiting.add(resolve);
+    if (milliseconds) setTimeout(resolve, milliseconds);
+  });
 
-  /** Load for as long as the page lives. */
-  async run() {
+  async function run() {
     for (let attempt = 0; ; ) {
-      const before = this.received;
+      const before = received;
       try {
-        if (!this.head) await this.open();
-        else if (!(await this.next())) await this.change();
+        if (!(await next())) await change();
         attempt = 0;
       } catch (error) {
-        if (this.received > before) attempt = 0;
-        if (error instanceof LineError && error.again) {
-          const seconds = Math.min(0.5 * 2 ** attempt++, 10);
-          this.tell({ type: 'trouble', text: error.message, seconds });
-          this.troubled = true;
-          await this.change(1000 * seconds);
-        } else {
-          const known = error instanceof StreamError || error instanceof LineError;
-          const memory = error instanceof RangeError && /alloc|length/i.test(error.message);
-          const text = memory ? 'The mesh is too large for this device.' : known ? error.message : `The file is damaged: ${error.message}.`;
-          this.tell({ type: 'failed', text });
-          this.retry = false;
-          while (!this.retry) await this.change();
-          this.tell({ type: 'trouble', text: '' });
-          if (!this.head) this.first = new Uint8Array(0);
+        if (received > before) attempt = 0;
+        const memory = /alloc|length/i.test(error.message) ? 'The mesh is too large for this device.' : 'The file is damaged.';
+        let text = error instanceof StreamError ? error.message : memory;
+        const seconds = Math.min(0.5 * 2 ** attempt++, 10);
+        if (error.again) text += ` What came is shown; trying again in ${Math.ceil(seconds)} s.`;
+        tell({ type: 'trouble', text, failed: !error.again });
+        troubled = true;
+        retry = false;
+        if (error.again) await change(1000 * seconds);
+        else {
+          while (!retry) await change();
+          if (!head) received = 0;
         }
       }
     }
   }
 
   /** Try once more after a failure or a broken line. */
-  again() {
-    this.retry = true;
-    for (const row of this.rows ?? []) if (row.bad) row.bad = row.have = 0;
-    this.wake();
+  function again() {
+    retry = true;
+    for (const row of rows) row.bad = 0;
+    wake();
   }
 
   // -- bytes -------------------------------------------------------------------------------------------------------
 
-  /** Read from the line; `take` gets each part and its place, and says whether to go on. */
-  async fetch(begin, end, take) {
-    const { budget } = this.wish;
-    let stop = end;
-    if (budget && this.line.ranges) stop = Math.min(end, begin + Math.max(1024, Math.floor(budget / 10)));
-    if (budget) await this.pay(Math.min(stop - begin, budget / 10));
-    const abort = (this.abort = new AbortController());
-    let at = begin;
+  /** Wait until the budget allows some bytes; gives how many. */
+  async function allowance() {
+    for (;;) {
+      const { budget } = wish;
+      if (!budget) return Infinity;
+      const least = Math.max(50, 1024000 / budget); // milliseconds of the line that are worth a request
+      paid = Math.max(paid, now() - 2 * least);
+      if (now() - paid >= least) return Math.floor(((now() - paid) * budget) / 1000);
+      await change(paid + least - now());
+    }
+  }
+
+  /** Take in a part of the file. */
+  function keep(part, at) {
+    const end = at + part.length;
+    if (end > file.length) {
+      const grown = new Uint8Array(Math.max(end, 2 * file.length));
+      grown.set(file);
+      file = grown;
+    }
+    file.set(part, at);
+    mark(at, end);
+    received += part.length;
+    if (troubled) tell({ type: 'trouble', text: '' });
+    troubled = false;
+    if (wish.budget) paid += (1000 * part.length) / wish.budget;
+    const time = now();
+    pace.bytes += part.length;
+    if (time > pace.time + 200) {
+      const last = (1000 * pace.bytes) / (time - pace.time);
+      speed = speed ? (speed + last) / 2 : last;
+      pace = { time, bytes: 0 };
+    }
+    if (time > told + 60) report();
+  }
+
+  /** Note that the blocks have these bytes of the file. */
+  function mark(at, end) {
+    for (const row of rows) {
+      const due = row.begin + row.have;
+      if (at <= due && due < end) row.have = Math.min(end - row.begin, row.length);
+    }
+  }
+
+  /** Begin and end of what is to be fetched next; nothing where nothing is wanted. */
+  function span() {
+    if (!head) return [received, Math.max(FIRST, received >= FIXED ? readFixed(file).end : 0)];
+    const first = rows.findIndex(wanted);
+    if (first < 0) return null;
+    let last = first;
+    while (last + 1 < rows.length && wanted(rows[last + 1])) last++;
+    return [rows[first].begin + rows[first].have, rows[last].begin + rows[last].length];
+  }
+
+  /** Fetch and decode what is wanted next; false where nothing is. */
+  async function next() {
+    if (head) await decode();
+    const asked = span();
+    if (!asked) return false;
+    let [begin, end] = asked;
+    check(!line.size || begin < line.size, 'The file is cut short. What came is shown.');
+    end = Math.min(end, begin + await allowance());
+    abort = new AbortController();
+    const { signal } = abort;
     try {
-      for await (const part of this.line.read(begin, stop, abort.signal)) {
-        this.count(part.length);
-        const more = await take(part, at);
-        at += part.length;
-        if (!more) break;
-        if (abort.signal.aborted && this.line.ranges) break;
-        while (this.wish.paused && this.based) await this.change(); // without ranges the line is held, not left
-        if (budget && !this.line.ranges) await this.pay(part.length);
+      for await (const part of line.read(begin, end, signal)) {
+        keep(part, begin);
+        begin += part.length;
+        await (head ? decode() : open());
+        if (line.ranges) {
+          const row = rows.find((one) => !one.done && one.begin + one.length > begin);
+          if (signal.aborted || (row && !wanted(row))) break;
+        } else {
+          while (wish.paused && based) await change();
+          await allowance();
+        }
       }
     } catch (error) {
-      if (!abort.signal.aborted) throw error;
-    } finally {
-      this.abort = null;
-    }
-  }
-
-  /** Wait until the budget allows so many bytes more. */
-  async pay(bytes) {
-    for (;;) {
-      const { budget } = this.wish;
-      const time = now();
-      this.tokens = Math.min(this.tokens + ((time - (this.paid ?? time)) * budget) / 1000, Math.max(budget / 10, bytes));
-      this.paid = time;
-      if (!budget || this.tokens >= bytes) break;
-      await this.change(Math.ceil(((bytes - this.tokens) * 1000) / budget));
-    }
-    this.tokens -= bytes;
-  }
-
-  count(bytes) {
-    this.received += bytes;
-    if (this.troubled) this.tell({ type: 'trouble', text: '' });
-    this.troubled = false;
-    const time = now();
-    this.pace ??= { time, bytes: 0 };
-    this.pace.bytes += bytes;
-    const seconds = (time - this.pace.time) / 1000;
-    if (seconds > 0.2) {
-      const speed = this.pace.bytes / seconds;
-      this.speed = this.speed ? (this.speed + speed) / 2 : speed;
-      this.pace = { time, bytes: 0 };
-    }
-    this.progress();
-  }
-
-  async open() {
-    await this.fetch(this.first.length, Math.max(FIRST, this.need ?? 0), async (part, at) => {
-      if (this.head) {
-        this.put(part, at);
-        await this.decode();
-        return true;
-      }
-      const grown = new Uint8Array(this.first.length + part.length);
-      grown.set(this.first);
-      grown.set(part, this.first.length);
-      this.first = grown;
-      if (grown.length < FIXED) return true;
-      const sizes = readFixed(grown);
-      this.need = FIXED + sizes.header + sizes.table;
-      if (grown.length >= this.need && !this.line.ranges) await this.begin();
-      return true;
-    });
-    if (this.head) return;
-    if (this.first.length >= (this.need ?? FIXED)) await this.begin();
-    else if (this.line.size && this.first.length >= this.line.size) throw new LineError('The file is cut short.', false);
-  }
-
-  async begin() {
-    this.start(await readHead(this.first, readFixed(this.first)));
-    this.put(this.first, 0);
-    this.first = null;
-    await this.decode();
-  }
-
-  start(head) {
-    const { memory } = this.wish;
-    const previous = head.meshes.map(() => null);
-    let faces = head.meshes.reduce((sum, mesh) => sum + mesh.extra, 0);
-    let bytes = 0;
-    const rooms = head.meshes.map(() => ({ places: 0, faces: 0 }));
-    for (const row of head.rows) {
-      const before = previous[row.mesh];
-      row.before = before;
-      row.have = 0;
-      faces += row.faces - (before?.faces ?? 0);
-      row.total = faces;
-      // positions, normals and what predicts them: about 60 bytes a place, 40 a face
-      bytes += 60 * (row.places - (before?.places ?? 0)) + 40 * (row.faces - (before?.faces ?? 0));
-      row.tooMuch = bytes > memory && before !== null;
-      if (!row.tooMuch) rooms[row.mesh] = { places: row.places, faces: row.faces };
-      previous[row.mesh] = row;
-    }
-    this.meshes = head.meshes.map((mesh, at) => new Mesh(mesh, rooms[at]));
-    this.states = head.meshes.map(() => ({ row: null, next: null }));
-    this.rows = head.rows;
-    this.head = head;
-    const base = head.rows[head.meshes.length - 1].total;
-    if (this.wish.level < 1) this.wish.faces = Math.round(base * (faces / base) ** this.wish.level);
-    this.tell({
-      type: 'head', meta: head.header.meta ?? {}, rows: head.rows.map(({ total, error, mesh }) => ({ total, error, mesh })),
-      faces, bytes: head.end, tooMuch: head.rows.some((row) => row.tooMuch),
-      meshes: this.meshes.map((mesh, at) => ({
-        extra: mesh.head.extra, wedges: mesh.wedgeParents.length, meta: mesh.head.meta ?? {}, room: rooms[at],
-      })),
-    });
-  }
-
-  /** Lay received bytes where they belong. */
-  put(bytes, at) {
-    for (const row of this.rows) {
-      if (row.begin + row.length <= at || row.begin >= at + bytes.length || row.done) continue;
-      const from = row.begin + row.have;
-      if (from < at) continue;
-      const part = bytes.subarray(from - at, row.begin + row.length - at);
-      row.data ??= new Uint8Array(row.length);
-      row.data.set(part, row.have);
-      row.have += part.length;
-    }
-  }
-
-  /** Whether a block shall be fetched. */
-  wanted(row) {
-    if (row.done || row.tooMuch) return false;
-    if (!row.before) return true;
-    const { error, faces, views, paused } = this.wish;
-    if (paused) return false;
-    const view = views[row.mesh] ?? { visible: true, scale: 0 };
-    const before = row.before;
-    if (!view.visible || before.total >= faces) return false;
-    if (!error) return true;
-    return view.scale > 0 && !(before.error > 0 && before.error * view.scale <= error);
-  }
-
-  /** Fetch what is wanted next; false where nothing is. */
-  async next() {
-    await this.decode();
-    const first = this.rows.findIndex((row) => this.wanted(row));
-    if (first < 0) return false;
-    let last = first;
-    while (last + 1 < this.rows.length && this.wanted(this.rows[last + 1])) last++;
-    const begin = this.rows[first].begin + this.rows[first].have;
-    const end = this.rows[last].begin + this.rows[last].length;
-    if (this.line.size && this.line.size <= begin) throw new LineError('The file is cut short.', false);
-    await this.fetch(begin, this.line.ranges ? end : Infinity, async (part, at) => {
-      this.put(part, at);
-      await this.decode();
-      const row = this.rows.find((one) => !one.done && one.begin + one.length > at + part.length);
-      return !this.line.ranges || !row || this.wanted(row);
-    });
-    if (this.rows[first].have < this.rows[first].length && this.line.size && this.line.size < end) {
-      const got = this.rows[first].begin + this.rows[first].have;
-      if (got >= this.line.size) throw new LineError('The file is cut short. What came is shown.', false);
+      if (!signal.aborted) throw error;
     }
     return true;
   }
 
+  /** Read header and table once they are there. */
+  async function open() {
+    if (received < FIXED || received < readFixed(file).end) return;
+    const { header, ...found } = await readHead(file, readFixed(file));
+    rows = found.rows;
+    const previous = [];
+    const rooms = [];
+    let total = found.meshes.reduce((sum, mesh) => sum + mesh.extra, 0);
+    let bytes = 0;
+    for (const row of rows) {
+      const before = previous[row.mesh];
+      const { places, faces } = before ?? { places: 0, faces: 0 };
+      total += row.faces - faces;
+      // positions, normals and what predicts them: about 60 bytes a place, 40 a face
+      bytes += 60 * (row.places - places) + 40 * (row.faces - faces);
+      Object.assign(row, { before, total, have: 0, bad: 0, tooMuch: before && bytes > wish.memory });
+      if (!row.tooMuch) rooms[row.mesh] = row;
+      previous[row.mesh] = row;
+    }
+    meshes = found.meshes.map((mesh, at) => new Mesh(mesh, rooms[at]));
+    head = { faces: total, base: rows[meshes.length - 1].total };
+    tell({
+      type: 'head', ...head, meta: header.meta ?? {}, bytes: found.end, tooMuch: rows.some((row) => row.tooMuch),
+      meshes: meshes.map((mesh) => ({
+        wedges: mesh.wedgeParents.length, corners: mesh.faces.length, meta: mesh.head.meta ?? {},
+      })),
+    });
+    mark(0, received);
+    await decode();
+  }
+
+  /** Triangles of all meshes in the level that is asked for. */
+  const levelFaces = () => (wish.level < 1 ? Math.round(head.base * (head.faces / head.base) ** wish.level) : Infinity);
+
+  /** Whether a block shall be fetched. */
+  function wanted(row) {
+    if (row.done || row.tooMuch) return false;
+    if (!row.before) return true;
+    const { visible, scale } = wish.views?.[row.mesh] ?? { visible: true, scale: 0 };
+    if (wish.paused || !visible || row.before.total >= levelFaces()) return false;
+    const pixels = row.before.error * scale; // 0 where unknown
+    return !wish.error || (scale > 0 && !(pixels > 0 && pixels <= wish.error));
+  }
+
   // -- splits ------------------------------------------------------------------------------------------------------
 
-  async decode() {
-    for (const row of this.rows) {
-      if (row.done || row.have < row.length || (row.before && !row.before.done) || row.tooMuch) continue;
-      if (crc32(row.data) !== row.crc) return this.spoiled(row);
-      const mesh = this.meshes[row.mesh];
-      const state = this.states[row.mesh];
+  async function decode() {
+    for (const row of rows) {
+      if (row.done || row.have < row.length || row.tooMuch || (row.before && !row.before.done)) continue;
+      const data = file.subarray(row.begin, row.begin + row.length);
+      if (crc32(data) !== row.crc) {
+        row.have = 0; // asked for once more, in case the line did it
+        check(++row.bad < 2, `The file is damaged at block ${rows.indexOf(row)} of ${rows.length}. What came before it is shown.`);
+        return;
+      }
       const time = now();
-      const places = mesh.places;
       try {
-        if (row.before) await mesh.batch(row.data, row.places, row.faces);
-        else await mesh.base(row.data, row.places, row.faces);
+        await meshes[row.mesh][row.before ? 'batch' : 'base'](data, row.places, row.faces);
       } catch (error) {
-        for (const other of this.rows) if (other.mesh === row.mesh && !other.done) other.tooMuch = true;
+        for (const other of rows) if (other.mesh === row.mesh && !other.done) other.tooMuch = true;
         throw error;
       }
-      this.busy += now() - time;
-      this.splits += row.before ? mesh.places - places : 0;
-      this.decoded += row.length;
+      busy += now() - time;
+      splits += row.before ? row.places - row.before.places : 0;
       row.done = true;
-      row.data = null;
-      state.row = row;
-      if (now() - (this.breathed ?? 0) < 12) continue;
-      this.present();
+      if (now() < breathed + 12) continue;
+      present();
       await breath();
-      this.breathed = now();
+      breathed = now();
     }
-    this.present();
-    this.progress(true);
-    if (this.rows.every((row) => row.done) && !this.checked) await this.check();
-  }
-
-  /** A block whose checksum is wrong is asked for once more, in case the line did it. */
-  spoiled(row) {
-    row.data = null;
-    row.have = 0;
-    row.bad = (row.bad ?? 0) + 1;
-    if (row.bad < 2) return;
-    const at = this.rows.indexOf(row);
-    throw new StreamError(`The file is damaged at block ${at} of ${this.rows.length}. What came before it is shown.`);
-  }
-
-  async check() {
-    this.checked = true;
+    present();
+    if (!rows.every((row) => row.done) || whole.time) return;
     let identical = true;
-    for (const mesh of this.meshes) identical &&= (await digest(mesh)) === mesh.head.hash;
-    this.tell({ type: 'whole', identical, quantised: this.meshes.some((mesh) => mesh.head.bits), time: now() - this.begun });
+    for (const mesh of meshes) identical &&= (await digest(mesh)) === mesh.head.hash;
+    whole = { identical, quantised: meshes.some((mesh) => mesh.head.bits), time: now() - begun };
+    report();
   }
 
   // -- pictures ----------------------------------------------------------------------------------------------------
 
-  /** The triangles of all meshes as far as they are decoded. */
-  there() {
-    return this.meshes.reduce((sum, mesh) => sum + (mesh.places ? mesh.head.extra + mesh.faceCount : 0), 0);
-  }
-
-  /** The triangles that may be shown now: wanted, there, and on a slow line spread until more comes. */
-  target() {
-    const there = this.there();
-    const open = this.rows.find((row) => !row.done);
-    const { faces, cap, paused } = this.wish;
-    const limit = Math.min(faces, cap);
-    const wait = open && !paused && this.speed && this.wanted(open) ? (1000 * (open.length - open.have)) / this.speed : 0;
-    if (wait > 1.4 * STEP && this.shown && there > this.shown && limit > this.shown) {
-      clearTimeout(this.timer);
-      this.timer = setTimeout(() => this.present(true), STEP);
-      if (!this.due) return this.shown;
-      return Math.min(limit, this.shown + Math.ceil((there - this.shown) * Math.min(1, (1.5 * STEP) / wait)));
-    }
-    return limit;
-  }
-
-  /** Post the level to show, unless the page is still busy with the one before. */
-  present(due = false) {
-    if (!this.head) return;
-    this.due ||= due;
-    if (!this.pictured && !this.mayBegin()) return;
-    if (this.drawing) {
-      this.pending = true;
+  /** Show the level that is wanted, there, and on a slow line not so fine that nothing is left until more comes. */
+  function present(hurry) {
+    if (!head || drawing || !mayBegin()) return;
+    clearTimeout(timer);
+    const open = rows.find(wanted);
+    const rest = posted + STEP - now();
+    if (open && rest > 0 && !hurry) {
+      timer = setTimeout(present, rest);
       return;
     }
-    const open = this.rows.find((row) => !row.done && this.wanted(row));
-    const pause = this.there() < 4 * this.shown ? LONG : QUIET; // all of them together cost little more than the last
-    const left = (this.posted ?? -LONG) + pause - now();
-    if (open && left > 0 && !this.hurry) {
-      this.quiet ??= setTimeout(() => {
-        this.quiet = undefined;
-        this.present();
-      }, left);
-      return;
+    let target = Math.min(levelFaces(), wish.cap);
+    const left = there() - shown;
+    const wait = open && speed ? (1000 * (open.length - open.have)) / speed : 0;
+    if (wait > 1.5 * STEP && left > 0 && target > shown) {
+      target = Math.min(target, shown + Math.ceil((left * 1.5 * STEP) / wait));
+      timer = setTimeout(present, STEP);
     }
-    this.hurry = false;
-    const target = this.target();
-    this.due = false;
-    const places = this.placesFor(target);
-    if (places.every((count, at) => count === this.levels[at])) return;
-    const changes = [];
-    places.forEach((count, at) => {
-      if (count !== this.levels[at]) changes.push({ mesh: at, places: count });
-    });
-    this.levels = places;
-    this.shown = this.meshes.reduce((sum, mesh, at) => sum + mesh.head.extra + (mesh.facesAfter[places[at] - 1] ?? 0), 0);
-    this.drawing = true;
-    this.posted = now();
-    const first = !this.pictured;
-    this.pictured = true;
-    this.tell({ type: 'level', changes, shown: this.shown, first, used: this.used(), time: now() - this.begun });
-    this.progress(true);
+    const places = placesFor(target);
+    if (places.every((count, at) => count === levels[at])) return;
+    const first = !levels.length;
+    const changed = places.map((count, at) => (count === levels[at] ? -1 : count));
+    levels = places;
+    shown = meshes.reduce((sum, mesh, at) => sum + (mesh.facesAfter[places[at] - 1] ?? 0), 0);
+    drawing = true;
+    posted = now();
+    show(changed, first ? { bytes: rows[0].begin + rows.reduce((sum, row) => sum + (row.done ? row.length : 0), 0), time: now() - begun } : null);
+    report();
   }
 
   /** The first picture waits for all of the first bytes, but not for long. */
-  mayBegin() {
-    if (!this.rows.every((row) => row.before || row.done)) return false;
-    const last = this.rows.findLast((row) => row.begin + row.length <= FIRST);
-    this.based ??= now();
-    if (!last || last.done || now() - this.based > PATIENCE) return true;
-    this.timer ??= setTimeout(() => this.present(), PATIENCE);
+  function mayBegin() {
+    if (levels.length) return true;
+    if (!rows.every((row) => row.before || row.done)) return false;
+    based ??= now();
+    const last = rows.findLast((row) => row.begin + row.length <= FIRST);
+    const rest = based + PATIENCE - now();
+    if (!last || last.done || rest <= 0) return true;
+    clearTimeout(timer);
+    timer = setTimeout(present, rest);
     return false;
   }
 
-  /** Bytes of the file that went into what is there. */
-  used() {
-    return this.rows[0].begin + this.rows.reduce((sum, row) => sum + (row.done ? row.length : 0), 0);
-  }
-
-  /** The page has drawn. */
-  drawn() {
-    this.drawing = false;
-    if (this.pending) {
-      this.pending = false;
-      this.present();
-    }
-  }
+  /** Triangles as far as they are decoded. */
+  const there = () => meshes.reduce((sum, mesh) => sum + mesh.faceCount, 0);
 
   /** Places of each mesh in the level with so many triangles. */
-  placesFor(target) {
-    const places = this.meshes.map(() => 0);
-    for (const row of this.rows) {
+  function placesFor(target) {
+    const places = [];
+    for (const row of rows) {
       if (!row.done) continue;
-      const start = row.total - (row.faces - (row.before?.faces ?? 0));
-      if (row.total <= target || !row.before) places[row.mesh] = row.places;
-      else if (start < target) places[row.mesh] = lastWithin(this.meshes[row.mesh].facesAfter, row, row.faces - row.total + target);
+      if (!row.before || row.total <= target) places[row.mesh] = row.places;
+      else if (places[row.mesh] === row.before.places) {
+        const { facesAfter, faceCount } = meshes[row.mesh];
+        let last = row.places;
+        while (last > row.before.places && row.total - facesAfter[row.places - 1] + facesAfter[last - 1] > target) last--;
+        places[row.mesh] = last;
+      }
     }
     return places;
   }
 
-  progress(force) {
-    const time = now();
-    if (!force && time - (this.told ?? 0) < 60) return;
-    this.told = time;
-    const rows = this.rows ?? [];
-    const there = this.head ? this.there() : 0;
-    const errors = (this.states ?? []).map((state) => this.errorOf(state));
-    this.tell({
-      type: 'progress', received: this.received, there, shown: this.shown, errors, ranges: this.line.ranges,
-      splits: this.splits, rate: this.busy ? (1000 * this.splits) / this.busy : 0,
-      waiting: rows.length > 0 && rows.some((row) => !row.done) && !rows.some((row) => this.wanted(row)),
+  /** Tell how far all is. */
+  function report() {
+    told = now();
+    const errors = levels.map((places, mesh) => {
+      const own = rows.filter((row) => row.mesh === mesh);
+      const row = own.findLast((one) => one.places <= places);
+      return row === own.at(-1) ? 0 : row?.error || -1;
+    });
+    tell({
+      type: 'state', received, there: there(), shown, errors, splits, ...whole, ranges: line.ranges,
+      rate: busy && (1000 * splits) / busy, waiting: rows.some((row) => !row.done) && !rows.some(wanted),
     });
   }
 
-  /** The estimated deviation of a mesh as it is shown; -1 where unknown. */
-  errorOf(state) {
-    const at = this.states.indexOf(state);
-    const places = this.levels[at] ?? 0;
-    let found = null;
-    for (const row of this.rows) if (row.mesh === at && row.places <= places) found = row;
-    if (!found) return -1;
-    const last = this.rows.findLast((row) => row.mesh === at);
-    return found === last ? 0 : found.error || -1;
-  }
-}
-
-/** Places of the finest level of a batch with at most so many faces of its mesh. */
-function lastWithin(facesAfter, row, faces) {
-  let low = row.before.places;
-  let high = row.places;
-  while (low < high) {
-    const middle = (low + high + 1) >> 1;
-    if (facesAfter[middle - 1] <= faces) low = middle;
-    else high = middle - 1;
-  }
-  return low;
+  run();
+  return {
+    want,
+    again,
+    get meshes() {
+      return meshes;
+    },
+    /** The page has drawn. */
+    drawn() {
+      drawing = false;
+      present();
+    },
+    /** Show the same level anew. */
+    renew() {
+      levels = levels.map(() => -1);
+      present(true);
+    },
+  };
 }

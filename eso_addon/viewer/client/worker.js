@@ -1,46 +1,35 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The other thread: everything between the line and the buffers that are drawn.
 import { finest } from './finest.js';
-import { Held, Line } from './line.js';
-import { Picture } from './picture.js';
-import { Stream } from './stream.js';
+import { makeHeld, makeLine } from './line.js';
+import { makePicture } from './picture.js';
+import { makeStream } from './stream.js';
 
 let stream;
 let pictures;
-let wire = false;
+let wire;
 
-/** Pass on what the stream tells; a level goes with the buffers that it changes, handed over, not copied. */
-function tell(message) {
-  const buffers = [];
-  if (message.type === 'level') {
-    pictures ??= stream.meshes.map((mesh) => new Picture(mesh));
-    message.changes = message.changes.map(({ mesh, places }) => ({ mesh, ...pictures[mesh].take(places, wire) }));
-    for (const change of message.changes) {
-      for (const value of Object.values(change)) if (value?.buffer) buffers.push(value.buffer);
-    }
-  }
-  postMessage(message, buffers);
+/** Hand the buffers of a new level over. */
+function show(places, first) {
+  pictures ??= stream.meshes.map(makePicture);
+  const changes = pictures.map((picture, at) => (places[at] < 0 ? null : picture(places[at], wire)));
+  const arrays = changes.flatMap((change) => Object.values(change ?? {})).filter(ArrayBuffer.isView);
+  postMessage({ type: 'level', changes, first }, arrays.map((array) => array.buffer));
 }
 
 const actions = {
   open({ url, base64, wish }) {
-    const line = base64 ? new Held(Uint8Array.from(atob(base64), (letter) => letter.charCodeAt(0))) : new Line(url);
-    stream = new Stream(line, tell);
-    stream.want(wish);
-    stream.run();
+    const line = base64 ? makeHeld(Uint8Array.from(atob(base64), (letter) => letter.charCodeAt(0))) : makeLine(url);
+    stream = makeStream(line, wish, show, (message) => postMessage(message));
   },
   wish: ({ wish }) => stream.want(wish),
   drawn: () => stream.drawn(),
   again: () => stream.again(),
-  wire(message) {
-    wire = message.on;
-    stream.levels = [];
-    stream.present();
+  wire({ on }) {
+    wire = on;
+    stream.renew();
   },
   /** The meshes as they are there, for whoever wants to look at every byte. */
-  dump({ id }) {
-    const meshes = stream.meshes.map((mesh) => finest(mesh));
-    postMessage({ type: 'dump', id, meshes });
-  },
+  dump: ({ id }) => postMessage({ type: 'dump', id, meshes: stream.meshes.map((mesh) => finest(mesh)) }),
 };
 onmessage = ({ data }) => actions[data.type](data);
