@@ -14,7 +14,7 @@ from ..files.atomic import atomic_output
 from .client_files import CLIENT
 
 _THREE = ("three.core.js", "three.module.js")
-_IMPORT = re.compile(r"^import \{([^}]*)\} from '\./([\w.]+)';\n", flags=re.MULTILINE)
+_IMPORT = re.compile(r"^import (?:\{([^}]*)\} from )?'\./([\w.]+)';\n", flags=re.MULTILINE)
 _LATER = re.compile(r"import\('\./([\w.]+)'\)")
 _EXPORT = re.compile(r"^export (?=(?:async )?(?:function|class|const) (\w+))", flags=re.MULTILINE)
 _MAGIC = b"\x89ESOPM\r\n"
@@ -114,5 +114,6 @@ def _collect(name: str, parts: dict[str, str]) -> None:
     for needed in [name for _, name in _IMPORT.findall(text)] + _LATER.findall(text):
         _collect(needed, parts)
     names = ", ".join(_EXPORT.findall(text))
-    body = _EXPORT.sub("", _LATER.sub(r"modules['\1']", _IMPORT.sub(r"const {\1} = modules['\2'];\n", text)))
+    body = _IMPORT.sub(lambda found: f"const {{{found[1]}}} = modules['{found[2]}'];\n" if found[1] else "", text)
+    body = _EXPORT.sub("", _LATER.sub(r"modules['\1']", body))
     parts[name] = f"modules['{name}'] = (() => {{\n{body}return {{ {names} }};\n}})();\n"

@@ -11,7 +11,7 @@ const select = (name, label, options) =>
   `<label>${label}<select name="${name}">${options.map(([value, text]) => `<option value="${value}">${text}`).join('')}</select></label>`;
 const figure = (name, label) => `<div><dt>${label}</dt><dd class="${name}">–</dd></div>`;
 
-export const bytesText = (bytes) =>
+const bytesText = (bytes) =>
   bytes < 1000 ? `${bytes} B` : bytes < 1e6 ? `${(bytes / 1e3).toPrecision(3)} kB` : `${(bytes / 1e6).toPrecision(3)} MB`;
 const UNITS = { budget: (value) => `${bytesText(value)}/s`, frame: (value) => `${value} ms`, error: (value) => `${value} px` };
 const numbers = (name, label, none, values) => select(name, label, [[0, none], ...values.map((value) => [value, UNITS[name](value)])]);
@@ -37,7 +37,7 @@ ${select('shading', 'Shading', [['smooth', 'as given'], ['flat', 'flat']])}
 ${select('up', 'Up', [['z', 'Z'], ['y', 'Y']])}
 </form></div>`;
 
-const countText = (count) => Math.round(count).toLocaleString('en').replaceAll(',', '\u202f');
+export const countText = (count) => Math.round(count).toLocaleString('en').replaceAll(',', '\u202f');
 const pixelText = (pixels) => (pixels < 0 ? '–' : pixels && pixels < 0.01 ? '<\u2009.01 px' : `${Number(pixels.toPrecision(2))} px`);
 
 /** Fill the element's shadow; `act`: { play, level, wire, set, again }, what to do when someone asks for it. */
@@ -95,8 +95,8 @@ export function makePanel(root, act) {
         if (find(selector).innerHTML !== html) find(selector).innerHTML = html;
       };
       put('.state', text);
-      put('.bytes', `${bytesText(received)} <small>of ${bytesText(bytes)}</small>`);
-      put('.triangles', `${countText(shown)} <small>of ${countText(faces)}</small>`);
+      put('.bytes', `${bytesText(Math.min(received, bytes || received))} ${bytes ? `<small>of ${bytesText(bytes)}</small>` : ''}`);
+      put('.triangles', `${countText(shown)} ${faces ? `<small>of ${countText(faces)}</small>` : ''}`);
       put('.splits', rate ? countText(Number(rate.toPrecision(2))) : '–');
       put('.error', pixelText(pixels).replace('<', '&lt;'));
       find('progress').value = bytes && received / bytes;

@@ -59,7 +59,7 @@ export function makePicture(mesh) {
   /** Normals of vertices, weighted by area; of 16 bits. Wedges of a place share theirs. */
   function normals(index, limit) {
     const { positions, places } = mesh;
-    const sum = new Float32Array(3 * places);
+    const sum = new Float64Array(3 * places); // products of large or small numbers leave float32
     for (let i = 0; i < index.length; i += 3) {
       const a = 3 * wedgePlace[index[i]];
       const b = 3 * wedgePlace[index[i + 1]];

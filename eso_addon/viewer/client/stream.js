@@ -69,8 +69,9 @@ export function makeStream(line, wish, show, tell) {
         attempt = 0;
       } catch (error) {
         if (received > before) attempt = 0;
-        const memory = /alloc|length/i.test(error.message) ? 'The mesh is too large for this device.' : 'The file is damaged.';
-        let text = error instanceof StreamError ? error.message : memory;
+        const known = error instanceof StreamError;
+        const large = error instanceof RangeError && /alloc|length/i.test(error.message);
+        let text = known ? error.message : large ? 'The mesh is too large for this device.' : 'The file is damaged.';
         const seconds = Math.min(0.5 * 2 ** attempt++, 10);
         if (error.again) text += ` What came is shown; trying again in ${Math.ceil(seconds)} s.`;
         tell({ type: 'trouble', text, failed: !error.again });

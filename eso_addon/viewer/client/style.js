@@ -23,8 +23,8 @@ b { font-size: 17px; margin-right: 8px; }
 .row { display: flex; align-items: center; gap: 4px; }
 button { font: inherit; color: inherit; background: none; border: 0; border-radius: 10px; min-width: 40px; height: 40px;
   cursor: pointer; flex: none; display: grid; place-items: center; }
-button:disabled { opacity: 0.35; }
-.again, button:hover:enabled { background: var(--rim); }
+button:disabled { opacity: 0.35; pointer-events: none; }
+.again, button:hover { background: var(--rim); }
 button[aria-pressed=true] { background: var(--accent); color: var(--back); }
 :focus-visible { outline: 2px solid var(--accent); }
 svg { width: 20px; fill: none; stroke: currentColor; stroke-width: 1.8; stroke-linejoin: round; }
@@ -34,7 +34,8 @@ dt, small, label { font-size: 12px; font-weight: 400; }
 dd { margin: 0; font-variant-numeric: tabular-nums; font-weight: 600; white-space: nowrap; }
 progress { width: 100%; height: 6px; display: block; }
 form { grid-template-columns: repeat(3, 1fr); gap: 10px 14px; margin-top: 12px; }
-select { display: block; font: inherit; font-size: 14px; width: 100%; min-height: 38px; }
+select { display: block; font: inherit; font-size: 14px; width: 100%; height: 38px; margin-top: 3px; padding: 0 6px; color: var(--ink);
+  background: var(--back); border: 1px solid var(--rim); border-radius: 8px; }
 @container (max-width: 520px) {
   dl, form { grid-template-columns: 1fr 1fr; }
   form { max-height: 38vh; overflow: auto; }

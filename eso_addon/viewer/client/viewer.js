@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // <eso-viewer src="mesh.esopm">, or one tag: <script type="module" src="viewer.js" data-src="mesh.esopm"></script>
-import { makePanel } from './panel.js';
+import { countText, makePanel } from './panel.js';
 
 const USUAL = {
   budget: 0, frame: 0, error: 0, memory: 0, level: 1, colours: 'material', shading: 'smooth', up: 'z', theme: 'light dark', wire: false,
@@ -258,7 +258,7 @@ function begin(element) {
     let text = shown ? 'refining' : 'loading';
     if (seconds) text = '';
     if (waiting) text = 'as fine as the view needs';
-    if (shown && shown < there) text = `level of ${shown.toLocaleString()} triangles`;
+    if (shown && shown < there) text = `level of ${countText(shown)} triangles`;
     if (settings.paused && !seconds) text = 'paused';
     if (failed) text = 'stopped';
     const same = identical && shown === faces;

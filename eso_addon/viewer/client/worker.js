@@ -4,6 +4,15 @@ import { finest } from './finest.js';
 import { makeHeld, makeLine } from './line.js';
 import { makePicture } from './picture.js';
 import { makeStream } from './stream.js';
+// what these import, named here so that all is asked for at once
+import './container.js';
+import './hash.js';
+import './mesh.js';
+import './batch.js';
+import './coder.js';
+import './columns.js';
+import './fan.js';
+import './positions.js';
 
 let stream;
 let pictures;
