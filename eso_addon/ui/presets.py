@@ -1,11 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The presets of the panel, kept by Blender's preset system, and the sets of levels for engines."""
 
+from typing import Any
+
 import bpy
 from bl_operators.presets import AddPresetBase
 from bl_ui.utils import PresetPanel
 
 from ..settings.level_sets import LEVEL_SETS
+from ..settings.preset_path import unknown_folders
 
 SUBDIRECTORY = "eso_lod"
 _VALUES = (
@@ -14,7 +17,16 @@ _VALUES = (
 )  # fmt: skip
 
 
-class VIEW3D_MT_eso_presets(bpy.types.Menu):
+class _PresetMenu:
+    """Lists the presets that come with the add-on, whether Blender knows where they are or not."""
+
+    def path_menu(self, searchpaths: list[str], *arguments: Any, **options: Any) -> None:  # noqa: ANN401 - Blender's
+        """List the presets in these folders and in ours."""
+        folders = [*searchpaths, *unknown_folders(SUBDIRECTORY)]
+        bpy.types.Menu.path_menu(self, folders, *arguments, **options)
+
+
+class VIEW3D_MT_eso_presets(_PresetMenu, bpy.types.Menu):
     """Choose a preset."""
 
     bl_idname = "VIEW3D_MT_eso_presets"
@@ -35,7 +47,7 @@ class SCENE_OT_eso_preset_add(AddPresetBase, bpy.types.Operator):
     preset_values = [f"settings.{name}" for name in _VALUES]
 
 
-class VIEW3D_PT_eso_presets(PresetPanel, bpy.types.Panel):
+class VIEW3D_PT_eso_presets(_PresetMenu, PresetPanel, bpy.types.Panel):
     """The presets behind the icon in the panel's header."""
 
     bl_label = "ESO LOD Presets"
