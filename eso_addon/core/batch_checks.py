@@ -33,13 +33,12 @@ def check_batch(state: State, batch: Batch) -> None:
         rejected[flipped] = True
     if state.rules.guard:
         rejected |= _broken(state, batch, [links for _, _, _, links in tested], np.arange(count))
-    bound = state.guide or state.lines
-    if bound is not None:
-        rejected[bound.clashes(state.survivor, state.label)] = True
+    if state.guide is not None:
+        rejected[state.guide.clashes(state.survivor, state.label)] = True
     while rejected.any():
         rejected = _reject(state, batch, rejected)
-        if bound is not None and not rejected.any():
-            rejected[bound.clashes(state.survivor, state.label)] = True
+        if state.guide is not None and not rejected.any():
+            rejected[state.guide.clashes(state.survivor, state.label)] = True
 
 
 def _touched(state: State, part: slice) -> Touched:

@@ -15,10 +15,10 @@ import numpy as np
 from .alone import fails_alone
 from .batch_checks import check_batch, turned, withdraw
 from .blocks import Blocks
-from .engine_state import BLOCK, NONE, Batch, Guide, Lines, Rules, State
+from .engine_state import BLOCK, NONE, Batch, Guide, Rules, State
 from .manifold import boundary_fans
 from .mesh import Bools, Floats, Ints
-from .quadrics import endpoint_costs, move_memory, optimal_costs, optimal_places
+from .quadrics import endpoint_costs, move_memory, optimal_costs, optimal_places, settle
 from .record import CollapseRecord
 from .variation import angle_defects_and_areas, edge_curvature_factor
 
@@ -35,7 +35,7 @@ _LARGE = 20_000
 
 def collapse_steps(points: Floats, faces: Ints, quadrics: Floats, boundary: Bools, locked: Bools | None, target: int,
                    rules: Rules, blocks: Blocks,
-                   guide: Guide | None = None, lines: Lines | None = None) -> Generator[int, None, CollapseRecord]:
+                   guide: Guide | None = None) -> Generator[int, None, CollapseRecord]:
     """Collapse edges until `target` faces are left or nothing more can go.
 
     Parameters
@@ -44,7 +44,7 @@ def collapse_steps(points: Floats, faces: Ints, quadrics: Floats, boundary: Bool
         About the origin and of about unit size, in an order that keeps neighbours together.
     faces : ndarray, (3, m) int64
         Corners, in rows.
-    quadrics : ndarray, (n, 12) float64
+    quadrics : ndarray, (n, 12 or wider) float64
         Changed: those of the survivors at the end.
     boundary : ndarray, (n,) bool
         Vertices with a boundary edge.
@@ -55,8 +55,6 @@ def collapse_steps(points: Floats, faces: Ints, quadrics: Floats, boundary: Bool
     blocks : Blocks
     guide : Guide, optional
         Weighs in place of the quadrics, which may then be zeros; with endpoint placement only.
-    lines : Lines, optional
-        Says what may go along them; of no use beside a guide.
 
     Yields
     ------
@@ -68,7 +66,7 @@ def collapse_steps(points: Floats, faces: Ints, quadrics: Floats, boundary: Bool
     CollapseRecord
         Positions are the engine's.
     """
-    state = _begun(points, faces, quadrics, boundary, locked, rules, blocks, guide, lines)
+    state = _begun(points, faces, quadrics, boundary, locked, rules, blocks, guide)
     history: list[tuple] = []
     faces_before = state.alive
     _weigh(state)
@@ -91,7 +89,7 @@ def collapse_steps(points: Floats, faces: Ints, quadrics: Floats, boundary: Bool
 
 
 def _begun(points: Floats, faces: Ints, quadrics: Floats, boundary: Bools, locked: Bools | None, rules: Rules,
-           blocks: Blocks, guide: Guide | None, lines: Lines | None) -> State:
+           blocks: Blocks, guide: Guide | None) -> State:
     rows = np.zeros((points.shape[1] + 1, 4))
     rows[:-1, :3] = points.T
     fans = boundary_fans(faces, np.append(boundary, False))
@@ -100,7 +98,7 @@ def _begun(points: Floats, faces: Ints, quadrics: Floats, boundary: Bools, locke
     if guide is not None and locked is not None:
         guide.hold(locked)
     return State(rules, blocks, rows, quadrics, faces.copy(), np.append(boundary, False), fans, locked,
-                 faces.shape[1], guide, lines)
+                 faces.shape[1], guide)
 
 
 def _weigh(state: State) -> None:
@@ -128,10 +126,7 @@ def _counts(state: State, start: Ints, end: Ints) -> Bools:
 def _edge_costs(state: State, one: Ints, other: Ints) -> np.ndarray:
     if state.guide is not None:
         return np.zeros(len(one), np.float32)  # the guide adds its costs to what was not rejected
-    costs = _endpoint_costs(state, one, other) if state.rules.endpoint else _optimal_costs(state, one, other)
-    if state.lines is not None:
-        costs *= state.lines.tolls(one, other)
-    return costs
+    return _endpoint_costs(state, one, other) if state.rules.endpoint else _optimal_costs(state, one, other)
 
 
 def _endpoint_costs(state: State, one: Ints, other: Ints) -> np.ndarray:
@@ -274,6 +269,7 @@ def _place(state: State, slot: Ints, cost: np.ndarray) -> Batch:
         if not stays.all():
             places = np.where(stays, places, optimal_places(summed)) if stays.any() else optimal_places(summed)
         move_memory(summed, first, second, starts, ends, places, state.rules.memory)
+        settle(summed)
         batch.quadrics[part], batch.places[part, :3], batch.stays[part] = summed, places.T, stays
 
     def place(part: slice) -> None:
@@ -322,8 +318,6 @@ def _collapse(state: State, batch: Batch, target: int) -> tuple | None:
         state.fans[vertices] += state.fans.take(gone[part]) - (batch.falling.take(chosen[part]) == 1)
 
     state.blocks.map(carry_out, len(chosen), BLOCK // 4)
-    if state.lines is not None:
-        state.lines.follow(state.survivor)
     _update(state, batch)
     state.base.ravel()[failed] = np.inf
     state.label[kept], state.label[gone] = ~kept, ~gone

@@ -71,19 +71,6 @@ class Guide(Protocol):
         """Return the collapses of the batch that must not be done beside the others."""
 
 
-class Lines(Protocol):
-    """Edges that are simplified along themselves; what crosses them pays a toll."""
-
-    def clashes(self, survivor: Ints, label: Ints) -> Ints:
-        """Return the collapses of the batch after which two lines would be one."""
-
-    def follow(self, survivor: Ints) -> None:
-        """Take note of a batch that was carried out."""
-
-    def tolls(self, one: Ints, other: Ints) -> np.ndarray:
-        """Return what the cost of each edge is multiplied by, (e,) float32."""
-
-
 @dataclass
 class State:
     """The mesh on its way down; n vertices in Morton order, m faces, and a vertex n for dead faces."""
@@ -91,14 +78,13 @@ class State:
     rules: Rules
     blocks: Blocks
     points: Floats  # (n + 1, 4) rows, the last column unused: rows of 32 bytes are gathered fastest
-    quadrics: Floats  # (n, 12)
+    quadrics: Floats  # (n, 12 or wider)
     faces: Ints  # (3, m)
     boundary: Bools  # (n + 1,)
     fans: Ints  # (n + 1,) runs of faces from boundary to boundary
     locked: Bools | None  # (n,)
     alive: int
     guide: Guide | None = None
-    lines: Lines | None = None
     costs: np.ndarray = field(init=False)  # (3, m) float32
     base: np.ndarray = field(init=False)  # (3, m) float32, costs before the curvature factor
     dead: int = 0

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .attributes import check_attributes
+from .attributes import Layer, check_attributes
 from .carrier import Carrier
-from .line_guard import LineGuard
 from .lines import MATERIAL, SEAM, SHARP, Lines, find_lines
 from .mesh import Bools, Floats, Ints, MeshError
 from .options import Options
@@ -24,17 +23,18 @@ class Guidance:
     Attributes
     ----------
     lines : Lines, optional
-    guard : LineGuard, optional
     locked : ndarray, (n,) bool, optional
     importance : ndarray, (n,) float64, optional
     carrier : Carrier, optional
+    layers : tuple of (Layer, ndarray)
+        What may enter the cost, with the elements at the corners of the engine's faces, (3, m) int64.
     """
 
     lines: Lines | None
-    guard: LineGuard | None
     locked: Bools | None
     importance: Floats | None
     carrier: Carrier | None
+    layers: tuple[tuple[Layer, Ints], ...] = ()
 
     @property
     def edges(self) -> Ints | None:
@@ -72,7 +72,7 @@ def guidance_of(mesh: Prepared, original: tuple[Floats, Ints], options: Options,
         locked[mesh.vertex[mirror.locked & (mesh.vertex >= 0)]] = True
     importance = _importance(mesh, options, len(vertices))
     if not options.attributes and not locked.any() and mirror is None:
-        return Guidance(None, None, None, importance, None)
+        return Guidance(None, None, importance, None)
     attributes = check_attributes(options.attributes or {}, len(vertices), len(faces), options.edges)
     modes = {SEAM: options.seam_lines, MATERIAL: options.material_lines, SHARP: options.sharp_lines}
     own, input_faces = (attributes, faces) if mirror is None else (mirror.of_half(attributes), faces[mirror.half])
@@ -80,11 +80,11 @@ def guidance_of(mesh: Prepared, original: tuple[Floats, Ints], options: Options,
     for bit, mode in modes.items():
         if mode == "locked":
             locked[lines.along(bit)] = True
-    guard = None
-    if (lines.kinds > 0).any() and options.method != "feature":
-        guard = LineGuard(lines.edges, mesh.points.shape[1], options.line_toll)
     carrier = Carrier(mesh, original, attributes, lines, locked, mirror)
-    return Guidance(lines, guard, locked if locked.any() else None, importance, carrier)
+    elements = {"corner": lines.corner, "vertex": input_faces.ravel().take(lines.corner)}
+    layers = tuple((layer, elements[layer.domain]) for layer in own.layers
+                   if layer.domain in elements and layer.name not in lines.scattered)
+    return Guidance(lines, locked if locked.any() else None, importance, carrier, layers)
 
 
 def _importance(mesh: Prepared, options: Options, count: int) -> Floats | None:

@@ -43,7 +43,7 @@ class Lines:
         0 where an edge is no line, else bits of SEAM, MATERIAL and SHARP.
     opened : ndarray, (n,) bool
         Vertices at boundaries and odd edges, where faces may be parted without a line.
-    messages : tuple of str
+    scattered : tuple of str
         Layers that have no lines because they have nothing else.
     """
 
@@ -52,7 +52,13 @@ class Lines:
     pairs: Ints
     kinds: np.ndarray
     opened: Bools
-    messages: tuple[str, ...]
+    scattered: tuple[str, ...]
+
+    @property
+    def messages(self) -> tuple[str, ...]:
+        """What a user should know."""
+        return tuple(f"{name} differs across most edges: it is carried, but holds none of them"
+                     for name in self.scattered)
 
     @property
     def edges(self) -> Ints:
@@ -117,7 +123,7 @@ def find_lines(mesh: Prepared, input_faces: Ints, attributes: AttributeSet, igno
     keys, (one, other) = side_pairs(faces, count)
     pairs = _corners_of(faces, one, other)
     kinds = np.zeros(len(one), np.uint8)
-    messages = []
+    scattered = []
     at_corner = {"corner": corner.ravel(), "face": np.tile(mesh.face, 3),
                  "vertex": input_faces.ravel().take(corner).ravel()}
     for layer in attributes.layers:
@@ -131,10 +137,10 @@ def find_lines(mesh: Prepared, input_faces: Ints, attributes: AttributeSet, igno
             if layer.kind == "uv":
                 found |= _folds(layer, at_corner[layer.domain].reshape(faces.shape), pairs)
         if found.sum() > max(_MOST * len(found), 12):
-            messages.append(f"{layer.name} differs across most edges: it is carried, but holds none of them")
+            scattered.append(layer.name)
         else:
             kinds[found] |= bits
-    return Lines(faces, corner, pairs, kinds, mesh.opened, tuple(messages))
+    return Lines(faces, corner, pairs, kinds, mesh.opened, tuple(scattered))
 
 
 def _corners_of(faces: Ints, one: Ints, other: Ints) -> Ints:

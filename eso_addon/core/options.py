@@ -63,8 +63,8 @@ class Options:
         (simplified along themselves, crossed last), "locked" (not touched) or "ignored".
     line_weight : float
         Weight of the quadrics that hold lines in their place.
-    line_toll : float
-        A collapse that crosses from one line to another, or lays two together, costs so many times as much.
+    attribute_weight : float
+        What UV maps, normals and colours count in the cost; one is as usual, nothing leaves them out.
     locked : array_like, (n,) bool, optional
         Vertices that neither go nor move.
     importance : array_like, (n,) float, optional
@@ -100,7 +100,7 @@ class Options:
     sharp_lines: str = "kept"
     boundary_lines: str = "kept"
     line_weight: float = 3.0
-    line_toll: float = 10.0
+    attribute_weight: float = 1.0
     locked: ArrayLike | None = None
     importance: ArrayLike | None = None
     symmetry: str = "none"
@@ -121,7 +121,7 @@ class Options:
         number("spread", self.spread, 1, np.inf)
         number("prune", self.prune, 0, np.inf)
         number("line_weight", self.line_weight, 0, 1e6)
-        number("line_toll", self.line_toll, 1, 1e6)
+        number("attribute_weight", self.attribute_weight, 0, 1e6)
         if self.symmetry not in ("none", "x", "y", "z"):
             raise MeshError(f"symmetry is {self.symmetry!r}: choose x, y, z or none")
         for name in ("seam_lines", "material_lines", "sharp_lines", "boundary_lines"):

@@ -2,7 +2,8 @@
 """Quadric error metrics (Garland and Heckbert; paper one, Equations 1 to 3 and 9) for arrays of vertices and edges.
 
 A quadric is a row of ten numbers, `a11 a12 a13 a22 a23 a33 b1 b2 b3 c`: the error at x is xᵀAx + 2bᵀx + c. Rows have
-two spare columns: a gather of 96 bytes is faster than one of 80.
+two spare columns: a gather of 96 bytes is faster than one of 80. Where attributes count, the first of these tells the
+vertices on lines, and behind them are the sums that `reduced` needs.
 """
 
 from collections.abc import Sequence
@@ -14,7 +15,8 @@ from .mesh import Floats, Ints
 # rows of a matrix, or a list of them
 Components = np.ndarray | Sequence[np.ndarray]
 WIDTH = 12
-_PAIRS = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
+LINED = 10
+PAIRS = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 _DIAGONAL = (0, 3, 5)
 # edges a block: two blocks of rows stay in the processor's second cache
 _BLOCK = 8192
@@ -42,7 +44,7 @@ def plane_quadrics(points: Floats, faces: Ints, *, area_weighted: bool) -> Float
     scale = np.where(areas > 0, (areas if area_weighted else 1.0) / np.maximum(areas * areas, 1e-300), 0.0)
     parts = np.empty((6, points.shape[1]))
     scaled = normals * scale
-    for part, (i, j) in zip(parts, _PAIRS, strict=True):
+    for part, (i, j) in zip(parts, PAIRS, strict=True):
         product = normals[i] * scaled[j]
         part[:] = sum(np.bincount(corner, product, points.shape[1]) for corner in faces)
     return parts
@@ -88,7 +90,7 @@ def boundary_quadrics(points: Floats, normals: Floats, edges: Ints, weight: floa
     along = points[:, edges[1]] - points[:, edges[0]]
     across = cross(along, normals)  # as long as the edge: its square is the weight by squared length
     parts = np.empty((6, points.shape[1]))
-    for part, (i, j) in zip(parts, _PAIRS, strict=True):
+    for part, (i, j) in zip(parts, PAIRS, strict=True):
         part[:] = np.bincount(edges.ravel(), np.tile(weight * across[i] * across[j], 2), points.shape[1])
     return parts
 
@@ -148,6 +150,45 @@ def move_memory(merged: Floats, one: Floats, other: Floats, starts: Floats, ends
                      - pull_other * (ends * ends).sum(axis=0))
 
 
+def reduced(summed: Floats) -> np.ndarray:
+    """Return the ten numbers of quadrics, (10, e), where attributes have the values that fit each place best.
+
+    The sums behind column 12 are the weight of the faces, and for each value its weighted slope and what it is at the
+    origin: to have one value costs how far those of the faces vary (Hoppe 1999, section 5, with the value eliminated).
+
+    Parameters
+    ----------
+    summed : ndarray, (e, 12 or wider) float64
+    """
+    q = summed.T[:10]
+    if summed.shape[1] == WIDTH:
+        return q
+    q = q.copy()
+    weight = summed[:, WIDTH]
+    share = np.where(weight > 0, 1 / np.where(weight > 0, weight, 1), 0)
+    for column in range(WIDTH + 1, summed.shape[1] - 3, 4):
+        terms = np.ascontiguousarray(summed.T[column : column + 4])
+        scaled = terms * share
+        for row, (i, j) in enumerate(PAIRS):
+            q[row] -= terms[i] * scaled[j]
+        q[6:10] -= terms * scaled[3]
+    return q
+
+
+def settle(merged: Floats) -> None:
+    """Give attributes of vertices on lines their value for good, in place: the other side of a line has others."""
+    if merged.shape[1] > WIDTH:
+        lined = np.flatnonzero(merged[:, LINED] > 0)
+        rows = merged.take(lined, axis=0)
+        rows[:, :10] = reduced(rows).T
+        rows[:, WIDTH:] = 0
+        merged[lined] = rows
+
+
+def _block(quadrics: Floats) -> int:
+    return _BLOCK * WIDTH // quadrics.shape[1]
+
+
 def _eliminate(q: np.ndarray) -> tuple[np.ndarray, ...]:
     """LDLᵀ of A with the pivots' inverses, and the forward substitution of b: stable where Cramer's rule is not."""
     a11, a12, a13, a22, a23, a33, b1, b2, b3, _ = q
@@ -166,19 +207,20 @@ def _eliminate(q: np.ndarray) -> tuple[np.ndarray, ...]:
 def optimal_costs(quadrics: Floats, one: Ints, other: Ints) -> np.ndarray:
     """Return the least error of each edge's summed quadric, (e,) float32; `one`, `other` are (e,) vertices."""
     costs = np.empty(len(one), np.float32)
-    for start in range(0, len(one), _BLOCK):
-        part = slice(start, start + _BLOCK)
+    block = _block(quadrics)
+    for start in range(0, len(one), block):
+        part = slice(start, start + block)
         summed = quadrics.take(one[part], axis=0)
         summed += quadrics.take(other[part], axis=0)
-        q = summed.T[:10]
+        q = reduced(summed)
         _, _, _, r1, r2, r3, y2, y3 = _eliminate(q)
         costs[part] = q[9] - q[6] * q[6] * r1 - y2 * y2 * r2 - y3 * y3 * r3
     return np.maximum(costs, 0, out=costs)
 
 
 def optimal_places(summed: Floats) -> Floats:
-    """Return where each summed quadric, (e, 12), is least: (3, e) float64."""
-    q = summed.T[:10]
+    """Return where each summed quadric, (e, 12 or wider), is least: (3, e) float64."""
+    q = reduced(summed)
     l21, l31, l32, r1, r2, r3, y2, y3 = _eliminate(q)
     z = -y3 * r3
     y = -y2 * r2 - l32 * z
@@ -187,8 +229,12 @@ def optimal_places(summed: Floats) -> Floats:
 
 
 def errors_at(summed: Floats, places: Floats) -> Floats:
-    """Return the error of each quadric, (e, 12), at its place, (3, e): (e,) float64."""
-    a11, a12, a13, a22, a23, a33, b1, b2, b3, c = summed.T[:10]
+    """Return the error of each quadric, (e, 12 or wider), at its place, (3, e): (e,) float64."""
+    return _errors(reduced(summed), places)
+
+
+def _errors(q: np.ndarray, places: Floats) -> Floats:
+    a11, a12, a13, a22, a23, a33, b1, b2, b3, c = q
     x, y, z = places
     return (x * (a11 * x + 2 * (a12 * y + a13 * z + b1)) + y * (a22 * y + 2 * (a23 * z + b2))
             + z * (a33 * z + 2 * b3) + c)
@@ -198,10 +244,12 @@ def endpoint_costs(quadrics: Floats, points: Floats, one: Ints, other: Ints) -> 
     """Return each edge's summed quadric at its ends: (e,) float32 at `one` and at `other`; points are (n, 4) rows."""
     at_one = np.empty(len(one), np.float32)
     at_other = np.empty(len(one), np.float32)
-    for start in range(0, len(one), _BLOCK):
-        part = slice(start, start + _BLOCK)
+    block = _block(quadrics)
+    for start in range(0, len(one), block):
+        part = slice(start, start + block)
         summed = quadrics.take(one[part], axis=0)
         summed += quadrics.take(other[part], axis=0)
-        at_one[part] = errors_at(summed, points.take(one[part], axis=0).T[:3])
-        at_other[part] = errors_at(summed, points.take(other[part], axis=0).T[:3])
+        q = reduced(summed)
+        at_one[part] = _errors(q, points.take(one[part], axis=0).T[:3])
+        at_other[part] = _errors(q, points.take(other[part], axis=0).T[:3])
     return np.maximum(at_one, 0, out=at_one), np.maximum(at_other, 0, out=at_other)

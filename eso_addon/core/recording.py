@@ -102,7 +102,7 @@ def recording_steps(original: Mesh, options: Options, least: int) -> Generator[f
         quadrics = initial_quadrics(mesh, options, blocks, guidance)
         yield 0.12
         run = collapse_steps(mesh.points, mesh.faces, quadrics, mesh.opened, guidance.locked, least, options.rules,
-                             blocks, guide, guidance.guard)
+                             blocks, guide)
         total = max(mesh.faces.shape[1] - least, 1)
         record = yield from scaled(run, lambda left: 0.12 + 0.88 * (1 - (left - least) / total))
     finally:

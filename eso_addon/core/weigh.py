@@ -3,6 +3,7 @@
 
 import numpy as np
 
+from .attribute_quadrics import with_attributes
 from .blocks import Blocks
 from .guidance import Guidance
 from .lines import MATERIAL, Lines
@@ -29,7 +30,7 @@ def initial_quadrics(mesh: Prepared, options: Options, blocks: Blocks, guidance:
 
     Returns
     -------
-    ndarray, (n, 12) float64
+    ndarray, (n, 12 or wider) float64
         See `quadrics`; without columns for "feature", which has none.
     """
     if options.method == "feature":
@@ -52,7 +53,11 @@ def initial_quadrics(mesh: Prepared, options: Options, blocks: Blocks, guidance:
             parts *= np.maximum(weights / mean, 1e-6) ** options.weight_power
     if guidance is not None and guidance.importance is not None:
         parts *= guidance.importance
-    return anchored(parts, mesh.points, options.memory)
+    quadrics = anchored(parts, mesh.points, options.memory)
+    if guidance is None or guidance.lines is None or options.attribute_weight == 0:
+        return quadrics
+    return with_attributes(quadrics, mesh.points, guidance.lines, guidance.layers, options.attribute_weight,
+                           guidance.importance)
 
 
 def line_quadrics(points: Floats, lines: Lines, weight: float) -> Floats:

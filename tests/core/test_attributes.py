@@ -3,6 +3,8 @@
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from eso_addon.core.attributes import Attribute, check_attributes
 from eso_addon.core.mesh import MeshError
@@ -135,10 +137,51 @@ def test_lines_locked_and_ignored(lines: str) -> None:
 
 def test_without_lines_the_shape_is_the_same_as_without_attributes() -> None:
     plain = simplify(VERTICES, FACES, ratio=0.2)
-    result = simplify(VERTICES, FACES, ratio=0.2, attributes={"color": VERTICES})
+    result = simplify(VERTICES, FACES, ratio=0.2, attribute_weight=0, attributes={"color": VERTICES})
     assert np.array_equal(result.vertices, plain.vertices)
     assert np.array_equal(result.faces, plain.faces)
     assert np.array_equal(result.vertex_map, plain.vertex_map)
+
+
+def test_values_that_are_no_appearance_do_not_change_the_shape() -> None:
+    plain = simplify(VERTICES, FACES, ratio=0.2)
+    result = simplify(VERTICES, FACES, ratio=0.2, attributes={"weight": Attribute(VERTICES**2, "vertex", "value")})
+    assert np.array_equal(result.vertices, plain.vertices)
+
+
+@pytest.mark.parametrize("kind", ["uv", "color", "normal"])
+def test_triangles_stay_where_attributes_bend(kind: str) -> None:
+    vertices, faces = sheet(41, 41)
+    vertices = vertices / np.ptp(vertices, axis=0).max()
+    bend = np.abs(vertices[:, :1] - 0.47)  # from there on the values run back
+    values = np.concatenate((bend, vertices[:, 1:2], np.ones_like(bend)), axis=1)
+    if kind == "normal":
+        values /= np.linalg.norm(values, axis=1, keepdims=True)
+    values = values[:, :2] if kind == "uv" else values
+    errors = []
+    for weight in (0, 1):
+        result = simplify(vertices, faces, ratio=0.02, attribute_weight=weight, seam_lines="ignored",
+                          attributes={"values": Attribute(values, "vertex", kind)})
+        middle = result.vertices[result.faces].mean(axis=1)
+        assert np.allclose(middle[:, 2], 0)
+        wanted = np.abs(middle[:, 0] - 0.47)
+        got = result.attributes["values"][result.faces].mean(axis=1)
+        got = got[:, 0] / (got[:, 2] if kind == "normal" else 1)
+        errors.append(np.abs(got - wanted).mean())
+    assert errors[1] < 0.5 * errors[0]
+
+
+@given(seed=st.integers(0, 2**31), ratio=st.floats(0.05, 0.9))
+@settings(deadline=None, max_examples=15)
+def test_any_values_give_a_mesh(seed: int, ratio: float) -> None:
+    rng = np.random.default_rng(seed)
+    vertices, faces = ball(2)
+    scale = 10.0 ** rng.uniform(-30, 30)
+    uv = rng.normal(size=(len(faces), 3, 2)) if seed % 2 else vertices[faces][..., :2] ** 3
+    result = simplify(vertices, faces, ratio=ratio, attributes={"uv": Attribute(uv * scale, "corner", "uv")})
+    assert len(result.faces) < len(faces)
+    assert np.isfinite(result.vertices).all()
+    assert np.abs(result.vertices).max() < 2
 
 
 def test_locked_vertices_stay_and_important_ones_keep_more() -> None:
@@ -186,7 +229,7 @@ def test_bad_attributes_are_refused(attributes: dict, words: str) -> None:
 
 
 @pytest.mark.parametrize("options", [
-    {"seam_lines": "maybe"}, {"line_toll": 0}, {"line_weight": -1}, {"symmetry": "w"}, {"locked": [1, 2]},
+    {"seam_lines": "maybe"}, {"attribute_weight": -1}, {"line_weight": -1}, {"symmetry": "w"}, {"locked": [1, 2]},
     {"importance": np.full(len(VERTICES), np.nan)},
     {"attributes": {}, "edges": [[0, 10**6]], "locked": VERTICES[:, 0] > 0},
 ])
