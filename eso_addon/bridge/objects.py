@@ -163,6 +163,13 @@ def join_local_view(objects: Iterable[bpy.types.Object], space: bpy.types.Space 
             obj.local_view_set(space, True)
 
 
+def hide(objects: Iterable[bpy.types.Object], view_layer: bpy.types.ViewLayer) -> None:
+    """Hide objects in the viewports, as far as the view layer has them; without a window there is nothing to hide."""
+    for obj in objects if not bpy.app.background else ():
+        if view_layer.objects.get(obj.name) == obj:
+            obj.hide_set(True, view_layer=view_layer)
+
+
 def select_only(objects: list[bpy.types.Object], view_layer: bpy.types.ViewLayer) -> None:
     """Select objects, the first of them active, and nothing else, as far as the view layer shows them."""
     view_layer.update()  # else it does not know objects that were just linked

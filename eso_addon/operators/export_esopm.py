@@ -69,6 +69,7 @@ class EXPORT_MESH_OT_esopm(bpy.types.Operator, ExportHelper):
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Read the objects, make the stream, write it in one step."""
         from ..bridge.stream_objects import mesh_objects, read_objects, stream_steps
+        from ..progressive.container import base_bytes
         from ..viewer.page import write_page
 
         started = time.perf_counter()
@@ -88,10 +89,13 @@ class EXPORT_MESH_OT_esopm(bpy.types.Operator, ExportHelper):
         finally:
             manager.progress_end()
         vertices = sum(mesh.vertex_count for mesh in scene.meshes)
+        base = base_bytes(Path(self.filepath).read_bytes())
         lost = sorted({name for mesh in meshes for name in mesh.left_behind})
-        tell(self, context, f"Exported {Path(self.filepath).name}",
-             [f"{scene.face_count:,} triangles", f"{size:,} bytes ({size / max(vertices, 1):.1f} a vertex)",
-              f"{time.perf_counter() - started:.2f} s"], [f"Not carried: {', '.join(lost)}"] if lost else [])
+        figures = [f"{scene.face_count:,} triangles", f"base {base:,} bytes",
+                   f"whole {size:,} bytes ({size / max(vertices, 1):.1f} a vertex)",
+                   f"{time.perf_counter() - started:.2f} s"]
+        notes = [f"Not carried: {', '.join(lost)}"] if lost else []
+        tell(self, context, f"Exported {Path(self.filepath).name}", figures, notes)
         return {"FINISHED"}
 
 

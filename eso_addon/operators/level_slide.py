@@ -139,7 +139,7 @@ class OBJECT_OT_eso_level_slide(SimplifyReading, bpy.types.Operator):
         shown.hide()
         source = bpy.data.objects.get(self._name)
         if source is not None:
-            source.hide_set(False)
+            source.hide_set(bool(self._result_name) and self.hide_others)
             if not self._result_name:
                 context.view_layer.objects.active = source
                 source.select_set(True)

@@ -93,6 +93,9 @@ class OBJECT_OT_eso_lod_generate(EngineOperator, LodOptions, bpy.types.Operator)
         made += place_instances(self._empties, PROFILES[self.profile].scene_name, context.scene)
         objects.select_only(made, context.view_layer)
         objects.join_local_view(made, context.space_data)
+        if self.hide_others:
+            coarser = [obj for obj in made if obj.get(level_info.LEVEL)]
+            objects.hide([*place_of, *self._empties, *coarser], context.view_layer)
         self._tell(context, result)
 
     def _chosen(self, context: bpy.types.Context) -> list[bpy.types.Object]:

@@ -111,6 +111,8 @@ class OBJECT_OT_eso_simplify(SimplifyReading, bpy.types.Operator):
             )
             objects.select_only([new], context.view_layer)
             objects.join_local_view([new], context.space_data)
+            if self.hide_others:
+                objects.hide([obj], context.view_layer)
         figures = [triangles(before, after), error_text(error), f"{self.seconds:.2f} s"]
         context.window_manager.eso_last_run.seconds = self.seconds
         tell(self, context, f"Simplified {obj.name}", figures, notes_of(self._source.left_behind, result))

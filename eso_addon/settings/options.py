@@ -100,6 +100,12 @@ class EngineOptions:
         default=True,
     )
 
+    hide_others: BoolProperty(
+        name="Hide Others",
+        description="Hide the source and coarser levels in the viewport: all of them stand in the same place",
+        default=True,
+    )
+
     def draw_engine(self, layout: bpy.types.UILayout) -> None:
         """Draw the options; what has no effect is greyed."""
         layout.prop(self, "preset")
@@ -117,6 +123,7 @@ class EngineOptions:
             layout.prop(self, name)
         layout.prop(self, "symmetry")
         layout.prop(self, "apply_modifiers")
+        layout.prop(self, "hide_others")
 
     def engine_options(self) -> dict[str, Any]:
         """Give the options as `simplify` and `lod_chain` take them."""
@@ -170,7 +177,9 @@ class SimplifyOptions(EngineOptions, KeepOptions, ScreenOptions):
 
     def draw_target(self, layout: bpy.types.UILayout) -> None:
         """Draw the target's kind and its value."""
-        layout.row(align=True).prop(self, "target", expand=True)
+        row = layout.row(align=True)
+        row.use_property_split = False  # four words are wider than the half that it leaves
+        row.prop(self, "target", expand=True)
         if self.target == "screen":
             layout.prop(self, "screen_size")
             self.draw_screen(layout)

@@ -243,6 +243,11 @@ TEXTS: dict[str, tuple[str, str, str, str]] = {
         "Lässt lose Teile weg, die kleiner sind; 0 behält alle", "Quita piezas sueltas menores; 0 las conserva todas",
         "これより小さい離れた部分を除きます。0 はすべて残します", "丢弃小于此值的独立部分；0 保留全部"),
     "Apply Modifiers": ("Modifikatoren anwenden", "Aplicar modificadores", "モディファイアーを適用", "应用修改器"),
+    "Hide Others": ("Andere verbergen", "Ocultar otros", "他を隠す", "隐藏其他"),
+    "Hide the source and coarser levels in the viewport: all of them stand in the same place": (
+        "Verbirgt die Quelle und gröbere Stufen in der Ansicht: alle stehen am selben Ort",
+        "Oculta el original y los niveles más bastos en la vista: todos están en el mismo lugar",
+        "同じ位置にある元のメッシュと粗いレベルをビューポートで隠します", "在视口中隐藏来源和较粗的级别：它们都在同一位置"),
     "Simplify the mesh as modifiers and shape keys show it; otherwise the results keep the modifiers": (
         "Vereinfacht das Netz, wie Modifikatoren und Formschlüssel es zeigen; sonst behalten die Ergebnisse sie",
         "Simplifica la malla como la muestran modificadores y formas; si no, los resultados conservan los modificadores",

@@ -7,7 +7,7 @@ import bpy
 
 from ..operators import level_slide, shown
 from ..operators.level_figures import level_figures
-from ..operators.lod_polls import why_not_generate
+from ..operators.lod_polls import why_not_generate, why_not_update
 from ..operators.polls import active_triangles, why_not_in_place, why_not_measure, why_not_simplify
 from .presets import VIEW3D_MT_eso_level_sets, VIEW3D_PT_eso_presets
 
@@ -103,12 +103,10 @@ class VIEW3D_PT_eso_levels(_SidebarPanel, bpy.types.Panel):
         settings.draw_levels(layout, as_text=False)
         reason = why_not_generate(context)
         _draw_button(context, layout, "object.eso_lod_generate", "Generate LODs", "OUTLINER_COLLECTION", reason)
-        for operator, text, icon in (
-            ("object.eso_lod_update", "Update LODs", "FILE_REFRESH"),
-            ("object.eso_lod_export", "Export LODs", "EXPORT"),
-        ):
-            if _exists(operator):
-                _draw_button(context, layout, operator, text, icon, "", scale=1.0)
+        reason = why_not_update(context)
+        _draw_button(context, layout, "object.eso_lod_update", "Update LODs", "FILE_REFRESH", reason, scale=1.0,
+                     told=False)  # fmt: skip
+        _draw_button(context, layout, "object.eso_lod_export", "Export LODs", "EXPORT", reason, scale=1.0)
 
 
 class VIEW3D_PT_eso_places(_SidebarPanel, bpy.types.Panel):
@@ -192,13 +190,13 @@ class VIEW3D_PT_eso_last_run(_SidebarPanel, bpy.types.Panel):
 
 _PANELS = (
     VIEW3D_PT_eso_simplify,
+    VIEW3D_PT_eso_last_run,
     VIEW3D_PT_eso_keep,
     VIEW3D_PT_eso_weights,
     VIEW3D_PT_eso_levels,
     VIEW3D_PT_eso_places,
     VIEW3D_PT_eso_measure,
     VIEW3D_PT_eso_stream,
-    VIEW3D_PT_eso_last_run,
 )
 
 
