@@ -24,6 +24,8 @@ from .fans import fans_at
 
 # batches are filled up once more than simplification asks: half as many are quicker to make, to write and to read
 _PASSES = 2
+# two closed fans have at least so many faces
+_TWO_FANS = 6
 
 
 def prepared(points: Floats, faces: Ints) -> Prepared | None:
@@ -34,15 +36,17 @@ def prepared(points: Floats, faces: Ints) -> Prepared | None:
         return None
 
 
-def tangled(faces: Ints, count: int) -> Bools:
-    """Find the vertices whose faces are anything but one fan: (count,) bool.
+def tangled(faces: Ints, opened: Bools) -> Bools:
+    """Find the vertices whose faces are anything but one fan: (n,) bool.
 
     Parameters
     ----------
     faces : ndarray, (3, m) int64
-    count : int
+    opened : ndarray, (n,) bool
+        Vertices at a boundary or at an edge that is not manifold. Others with few faces cannot have several fans.
     """
-    fans = fans_at(faces, np.ones(count, bool))
+    count = len(opened)
+    fans = fans_at(faces, opened | (np.bincount(faces.ravel(), minlength=count) >= _TWO_FANS))
     corners = len(fans.vertex)
     start = np.full(count, corners)
     open_start = np.flatnonzero(fans.predecessor < 0)
@@ -84,7 +88,7 @@ def run_engine(mesh: Prepared, locked: Bools, lines: Ints, options: Options,
     """
     blocks = Blocks(options.threads)
     try:
-        told = Guidance(None, None, None, None)
+        told = Guidance(None, None, None, None, None)
         if len(lines):
             marks = {"line": Attribute(np.ones(len(lines), bool), "edge", "seam")}
             # no face of the input is looked at: marks are on edges alone
@@ -94,7 +98,8 @@ def run_engine(mesh: Prepared, locked: Bools, lines: Ints, options: Options,
         quadrics = initial_quadrics(mesh, options, blocks, told)
         rules = replace(options.rules, passes=_PASSES)
         return (yield from collapse_steps(mesh.points, mesh.faces, quadrics, mesh.opened,
-                                          locked if locked.any() else None, target, rules, blocks, guide))
+                                          locked if locked.any() else None, target, rules, blocks, guide,
+                                          told.guard))
     finally:
         blocks.close()
 

@@ -13,12 +13,12 @@ from ..core.mesh import Floats, Ints
 if TYPE_CHECKING:
     from .patches import Patches
 
-_SAMPLE = 512
+_SAMPLE = 256
 # levels with faces in this ratio are measured; those between lie on the line between two, which is never less than the
 # convex fall of errors
-_STEP = 0.5
+_STEP = 0.4
 # of larger levels only faces near what the samples have become are looked at
-_LARGE = 8192
+_LARGE = 4096
 
 
 def estimated_errors(patches: Patches, costs: Floats) -> Floats:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..core.mesh import Floats, Ints, morton_order
+from ..core.mesh import Floats, Ints
 from ..core.steps import scaled
 from .batch_codec import Splits
 from .engine import endpoint_options, lines_of, prepared, run_engine, tangled
@@ -110,7 +110,7 @@ def make_patches(source: Source, target: int, options: dict[str, Any]) -> Genera
             mesh = prepared(points, unwinding.faces.T)
             if mesh is None:
                 break
-        own = tangled(mesh.faces, mesh.points.shape[1]) | (locked | unwinding.held).take(mesh.source)
+        own = tangled(mesh.faces, mesh.opened) | (locked | unwinding.held).take(mesh.source)
         lines = jumps.lines(points, unwinding)
         run = run_engine(mesh, own, lines, chosen, target)
         record = yield from scaled(run, lambda left: min(max((len(source.faces) - left) / total, 0.0), 1.0))
@@ -203,7 +203,7 @@ class _Numbering:
         for batch in batches:
             gone[batch.new] = True
         base = np.flatnonzero(~gone)
-        self.place[self._along(base)] = np.arange(len(base))
+        self.place[base] = np.arange(len(base))
         self.parents = [np.full(len(base), -1)]
         ids = np.zeros(0, np.int64) if mesh is None else mesh.ids
         rows = np.zeros((3, 0), np.int64) if mesh is None else self.place.take(mesh.faces)
@@ -216,11 +216,6 @@ class _Numbering:
         self.place_starts, self.face_starts = [self.places], [self.width]
         for batch in batches:
             self._number(batch)
-
-    def _along(self, base: Ints) -> Ints:
-        places = self.source.places[base]
-        points = np.where(np.isfinite(places), places, 0).astype(np.float64)
-        return base.take(morton_order(points)) if len(base) else base
 
     def _number(self, batch: Batch) -> None:
         old = self.place.take(batch.old)
@@ -305,6 +300,8 @@ class _Numbering:
 
     def _wedge_parents(self, starts: Ints) -> Ints:
         """Return what each wedge becomes: the wedge that a fallen face joins to it, else the first that falls."""
+        if starts[-1] == len(starts) - 1:  # one at each place
+            return np.concatenate(self.parents)
         parents = np.full(starts[-1], -1)
         for batch, splits, first in zip(self.batches, self.splits, self.place_starts, strict=False):
             order = np.argsort(self.place.take(batch.new), kind="stable")

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..core.mesh import Ints, MeshError, weld
+from ..core.mesh import Ints, MeshError, morton_order, weld
 from .geometry import place_of
 
 DOMAINS = ("vertex", "corner", "face", "side", "edge")
@@ -25,7 +25,7 @@ class Source:
     Attributes
     ----------
     places : ndarray, (p, 3) float32
-        Different positions, by their bits.
+        Different positions, by their bits, along a curve through space.
     faces : ndarray, (m, 3) int64
         Places.
     wedge : ndarray, (m, 3) int64
@@ -76,10 +76,12 @@ def make_source(vertices: ArrayLike, faces: ArrayLike, attributes: Mapping[str, 
     checked = _attributes(attributes or {}, counts)
     representative = weld(place_of(positions).astype(np.float64))
     own = np.flatnonzero(representative == np.arange(len(positions)))
+    # neighbours in space are neighbours in memory from here on
+    own = own.take(morton_order(np.where(np.isfinite(positions[own]), positions[own], 0).astype(np.float64)))
     number = np.zeros(len(positions), np.int64)
     number[own] = np.arange(len(own))
     place = number.take(representative)
-    wedge, starts, wedge_vertex, wedge_corner = _wedges(corners, place, len(own), checked["corner"])
+    wedge, starts, wedge_vertex, wedge_corner = _wedges(corners, place, own, checked["corner"])
     return Source(positions[own], place.take(corners), wedge, starts, wedge_vertex, wedge_corner, place, corners, loose,
                   checked)
 
@@ -115,8 +117,9 @@ def rows_as_bytes(named: Mapping[Any, np.ndarray], rows: int) -> np.ndarray:
     return np.concatenate([np.zeros((rows, 0), np.uint8), *parts], axis=1)
 
 
-def _wedges(corners: Ints, place: Ints, places: int, named: dict[str, np.ndarray]) -> tuple[Ints, Ints, Ints, Ints]:
-    """Give numbers to the different (vertex, corner attributes) at each place."""
+def _wedges(corners: Ints, place: Ints, own: Ints, named: dict[str, np.ndarray]) -> tuple[Ints, Ints, Ints, Ints]:
+    """Give numbers to the different (vertex, corner attributes) at each place; `own` is a vertex at each."""
+    places = len(own)
     flat = corners.ravel()
     kind = distinct(rows_as_bytes(named, len(flat))) if named else np.zeros(len(flat), np.int64)
     kinds = int(kind.max(initial=0)) + 1
@@ -127,7 +130,7 @@ def _wedges(corners: Ints, place: Ints, places: int, named: dict[str, np.ndarray
     if kinds == 1 and len(place) == places:  # one wedge a vertex, one vertex a place
         first = np.full(len(place), -1)
         first[flat[::-1]] = np.arange(len(flat))[::-1]
-        return np.zeros_like(corners), np.arange(places + 1), np.arange(places), first
+        return np.zeros_like(corners), np.arange(places + 1), own, first.take(own)
     keys, first, inverse = np.unique(keys, return_index=True, return_inverse=True)
     vertex = keys // kinds
     order = np.argsort(place.take(vertex) * len(place) + vertex, kind="stable")
