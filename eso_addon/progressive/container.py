@@ -118,6 +118,15 @@ def read(data: bytes, *, partial: bool) -> Container:
     return _optional(container, data, position, partial)
 
 
+def base_bytes(data: bytes) -> int:
+    """Return how many of a file's first bytes hold the bases of all meshes: from there on something can be shown."""
+    _, _, _, header_size, table_size, _ = _FIXED.unpack_from(data)
+    begin = _FIXED.size + header_size
+    meshes = len(_header(data[_FIXED.size : begin])["meshes"])
+    table = _table(data[begin : begin + table_size], meshes)
+    return begin + table_size + int(table["length"][:meshes].sum())
+
+
 def _optional(container: Container, data: bytes, position: int, partial: bool) -> Container:
     for name, mesh, length, checksum in container.header["optional"]:
         block = data[position : position + length]

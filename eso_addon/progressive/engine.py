@@ -88,7 +88,7 @@ def run_engine(mesh: Prepared, locked: Bools, lines: Ints, options: Options,
     """
     blocks = Blocks(options.threads)
     try:
-        told = Guidance(None, None, None, None, None)
+        told = Guidance(None, None, None, None)
         if len(lines):
             marks = {"line": Attribute(np.ones(len(lines), bool), "edge", "seam")}
             # no face of the input is looked at: marks are on edges alone
@@ -98,8 +98,7 @@ def run_engine(mesh: Prepared, locked: Bools, lines: Ints, options: Options,
         quadrics = initial_quadrics(mesh, options, blocks, told)
         rules = replace(options.rules, passes=_PASSES)
         return (yield from collapse_steps(mesh.points, mesh.faces, quadrics, mesh.opened,
-                                          locked if locked.any() else None, target, rules, blocks, guide,
-                                          told.guard))
+                                          locked if locked.any() else None, target, rules, blocks, guide))
     finally:
         blocks.close()
 
