@@ -92,12 +92,19 @@ def for_engine(layers: tuple[Layer, ...], triangle_corners: NDArray[np.int64],
         if layer.domain == "POINT":
             attributes[layer.name] = Attribute(layer.values, "vertex", layer.kind)
         elif layer.domain == "CORNER":
-            attributes[layer.name] = Attribute(layer.values[triangle_corners], "corner", layer.kind)
+            attributes[layer.name] = Attribute(at_corners(layer.values, triangle_corners), "corner", layer.kind)
         elif layer.domain == "EDGE":
             attributes[layer.name] = Attribute(layer.values, "edge", layer.kind)
         elif layer.kind != "label":  # borders of these are lines
             attributes[layer.name] = Attribute(layer.values[triangle_polygon], "face", layer.kind)
     return attributes
+
+
+def at_corners(values: NDArray, triangle_corners: NDArray[np.int64]) -> NDArray:
+    """Give values of a mesh's corners, (l, ...), at the corners of its triangles, (m, 3, ...)."""
+    if len(values) == triangle_corners.size:  # the mesh has nothing but triangles
+        return values.reshape(*triangle_corners.shape, *values.shape[1:])
+    return values[triangle_corners]
 
 
 def write_layer(mesh: bpy.types.Mesh, layer: Layer, values: NDArray) -> None:

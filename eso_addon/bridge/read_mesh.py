@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..core.attributes import Attribute
 from ..core.mesh import MeshError
 from .attributes import read_attribute
-from .layers import Layer, for_engine, read_layers
+from .layers import Layer, at_corners, for_engine, read_layers
 from .left_behind import names_left_behind
 from .shape_keys import ShapeKeys, read_keys, with_shapes
 from .vertex_groups import VertexGroups, read_groups
@@ -47,9 +47,12 @@ class MeshArrays:
     @property
     def carried(self) -> dict[str, Any]:
         """What the mesh carries, as options of the engine."""
-        attributes = for_engine(self.layers, self.triangle_corners, self.triangle_polygon)
+        # what is rendered comes first: of each kind it is what enters the engine's cost
+        shown = {name for which, name in (self.active or {}).items() if which.endswith("_render")}
+        layers = tuple(sorted(self.layers, key=lambda layer: layer.name not in shown))
+        attributes = for_engine(layers, self.triangle_corners, self.triangle_polygon)
         if self.normals is not None:
-            attributes[NORMALS] = Attribute(self.normals[self.triangle_corners], "corner", "normal")
+            attributes[NORMALS] = Attribute(at_corners(self.normals, self.triangle_corners), "corner", "normal")
         if self.groups is not None:
             attributes[GROUPS] = Attribute(self.groups.weights, "vertex", "value")
         if self.keys is not None:

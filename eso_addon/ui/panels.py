@@ -280,6 +280,6 @@ def _draw_button(
 def _draw_text(layout: bpy.types.UILayout, text: str, context: bpy.types.Context) -> None:
     """Draw a text in as many lines as the panel's width needs."""
     scale = context.preferences.system.ui_scale or 1.0  # 0 without a window
-    characters = max(int((context.region.width / scale - 45) / 6.5), 12)
+    characters = max(int((context.region.width / scale - 45) / 6), 12)
     for line in textwrap.wrap(text, characters):
         layout.label(text=line, translate=False)
