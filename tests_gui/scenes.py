@@ -36,6 +36,7 @@ def fresh(levels: int = 2) -> bpy.types.Object:
         bpy.ops.object.modifier_apply(modifier=kind)
     bpy.ops.object.shade_flat() if levels < 3 else bpy.ops.object.shade_smooth()
     w.look_at_object()
+    last_run().title = ""
     bpy.ops.ed.undo_push(message="A monkey")
     return obj
 

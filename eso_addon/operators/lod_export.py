@@ -79,9 +79,9 @@ class OBJECT_OT_eso_lod_export(bpy.types.Operator):
             export_levels(path, groups, profile.layout, write_stage if ending == ".blend" else WRITERS[ending])
         except (MeshError, OSError, RuntimeError) as error:
             return self._refused(error)
-        hulls = sum(len(group.hulls) for group in groups)
-        lines = [f"{len(groups)} objects", f"{sum(len(group.levels) for group in groups)} levels",
-                 *([f"{hulls} hulls"] if hulls else [])]
+        counts = {"object": len(groups), "level": sum(len(group.levels) for group in groups),
+                  "hull": sum(len(group.hulls) for group in groups)}
+        lines = [f"{count} {name}{'s' if count > 1 else ''}" for name, count in counts.items() if count]
         tell(self, context, f"Wrote {path.name} for {profile.label}", lines, self._stale_notes(context))
         return {"FINISHED"}
 

@@ -190,11 +190,11 @@ class VIEW3D_PT_eso_last_run(_SidebarPanel, bpy.types.Panel):
 
 _PANELS = (
     VIEW3D_PT_eso_simplify,
-    VIEW3D_PT_eso_last_run,
     VIEW3D_PT_eso_keep,
     VIEW3D_PT_eso_weights,
     VIEW3D_PT_eso_levels,
     VIEW3D_PT_eso_places,
+    VIEW3D_PT_eso_last_run,
     VIEW3D_PT_eso_measure,
     VIEW3D_PT_eso_stream,
 )
