@@ -15,7 +15,7 @@ _VIEWS = ((1, 0, 0.3), (-1, 0, 0.3), (0, 1, 0.3), (0, -1, 0.3), (0.3, 0.2, 1), (
 _SIZE = 400
 
 
-def rendered_difference(shown: Shown, folder: Path, name: str) -> tuple[float, float]:
+def rendered_difference(shown: Shown, folder: Path, name: str, light: str = "STUDIO") -> tuple[float, float]:
     """Render the original and two versions of it, and compare.
 
     Parameters
@@ -25,6 +25,8 @@ def rendered_difference(shown: Shown, folder: Path, name: str) -> tuple[float, f
         Where the pictures go.
     name : str
         Of the pictures.
+    light : str
+        As Workbench has it: "STUDIO", or "FLAT" for the texture alone.
 
     Returns
     -------
@@ -33,15 +35,17 @@ def rendered_difference(shown: Shown, folder: Path, name: str) -> tuple[float, f
     """
     folder.mkdir(parents=True, exist_ok=True)
     camera = _scene(shown)
+    bpy.context.scene.display.shading.light = light
     originals = [obj.data for obj, _, _ in shown]
     for obj, _, _ in shown:
         if obj.data.shape_keys is not None:
             obj.show_only_shape_key, obj.active_shape_key_index = True, 0
-    pictures = [_render(camera, shown, folder / f"{name}_original.png")]
+    frame = _frame(shown)
+    pictures = [_render(camera, frame, folder / f"{name}_original.png")]
     for which, title in ((1, "ours"), (2, "decimate")):
         for entry in shown:
             entry[0].data = entry[which]
-        pictures.append(_render(camera, shown, folder / f"{name}_{title}.png"))
+        pictures.append(_render(camera, frame, folder / f"{name}_{title}.png"))
     for (obj, _, _), data in zip(shown, originals, strict=True):
         obj.data = data
     original, one, other = pictures
@@ -58,7 +62,6 @@ def _scene(shown: Shown) -> bpy.types.Object:
     scene.collection.objects.link(camera)
     scene.camera = camera
     scene.render.engine = "BLENDER_WORKBENCH"
-    scene.display.shading.light = "STUDIO"
     scene.display.shading.color_type = "TEXTURE"
     scene.display.render_aa = "5"
     scene.render.resolution_x = scene.render.resolution_y = _SIZE
@@ -67,10 +70,15 @@ def _scene(shown: Shown) -> bpy.types.Object:
     return camera
 
 
-def _render(camera: bpy.types.Object, shown: Shown, path: Path) -> np.ndarray:
-    """Render six views side by side, and give their pixels."""
+def _frame(shown: Shown) -> tuple[np.ndarray, float]:
+    """Return where the originals are, and how large: every version is seen from the same place."""
     corners = np.array([obj.matrix_world @ Vector(corner) for obj, _, _ in shown for corner in obj.bound_box])
-    center, radius = (corners.min(axis=0) + corners.max(axis=0)) / 2, np.ptp(corners, axis=0).max() * 0.6
+    return (corners.min(axis=0) + corners.max(axis=0)) / 2, np.ptp(corners, axis=0).max() * 0.6
+
+
+def _render(camera: bpy.types.Object, frame: tuple[np.ndarray, float], path: Path) -> np.ndarray:
+    """Render six views side by side, and give their pixels."""
+    center, radius = frame
     camera.data.ortho_scale = 2 * radius
     camera.data.clip_end = 10 * radius
     images = []

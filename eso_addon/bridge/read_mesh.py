@@ -110,9 +110,9 @@ def read_mesh(
         if keys is not None:
             keys, lost = _evaluated_keys(obj, keys, depsgraph)
         with _shown_key(obj, 0 if keys is not None else None), evaluated_mesh(obj, depsgraph) as mesh:
-            return _arrays_of(obj, mesh, transform, keys, carry=carry, lost=lost)
+            return _arrays_of(obj, mesh, transform, keys, obj.evaluated_get(depsgraph) if carry else None, lost)
     with stored_mesh(obj) as mesh:
-        return _arrays_of(obj, mesh, transform, keys, carry=carry)
+        return _arrays_of(obj, mesh, transform, keys, obj if carry else None)
 
 
 def _has_modifiers(obj: bpy.types.Object) -> bool:
@@ -208,8 +208,9 @@ def stored_mesh(obj: bpy.types.Object) -> Iterator[bpy.types.Mesh]:
         obj.to_mesh_clear()
 
 
-def _arrays_of(obj: bpy.types.Object, mesh: bpy.types.Mesh, transform: NDArray[np.float64], keys: ShapeKeys | None, *,
-               carry: bool, lost: str = "") -> MeshArrays:
+def _arrays_of(obj: bpy.types.Object, mesh: bpy.types.Mesh, transform: NDArray[np.float64], keys: ShapeKeys | None,
+               owner: bpy.types.Object | None, lost: str = "") -> MeshArrays:
+    """Read a mesh that an object shows; with its owner, the object or as it is evaluated, all that it carries."""
     corners, polygon = _triangulated(mesh)
     corner_vertex = _read_or(mesh, ".corner_vert", len(mesh.loops), np.int32)
     positions = read_attribute(mesh, "position")
@@ -237,11 +238,12 @@ def _arrays_of(obj: bpy.types.Object, mesh: bpy.types.Mesh, transform: NDArray[n
         left_behind=names_left_behind(mesh, lost),
         template=obj.data,
         selected=_read_or(mesh, ".select_poly", len(mesh.polygons), np.bool_)[polygon],
-        **(_carried_of(obj, mesh, keys) if carry else {}),
+        **(_carried_of(obj, mesh, keys, owner) if owner is not None else {}),
     )
 
 
-def _carried_of(obj: bpy.types.Object, mesh: bpy.types.Mesh, keys: ShapeKeys | None) -> dict[str, Any]:
+def _carried_of(obj: bpy.types.Object, mesh: bpy.types.Mesh, keys: ShapeKeys | None,
+                owner: bpy.types.Object) -> dict[str, Any]:
     """Read what a mesh carries."""
     normals = None
     if mesh.has_custom_normals:
@@ -260,7 +262,7 @@ def _carried_of(obj: bpy.types.Object, mesh: bpy.types.Mesh, keys: ShapeKeys | N
         "active": active,
         "normals": normals,
         "free_normals": custom is not None and custom.data_type == "FLOAT_VECTOR",
-        "groups": read_groups(obj, mesh),
+        "groups": read_groups(obj, mesh, owner),
         "keys": keys,
     }
 

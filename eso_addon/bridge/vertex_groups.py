@@ -34,9 +34,17 @@ class VertexGroups:
         return int((self.weights[:, self.deforms] > 0).sum(axis=1).max(initial=0))
 
 
-def read_groups(obj: bpy.types.Object, mesh: bpy.types.Mesh) -> VertexGroups | None:
-    """Read the groups of an object with the weights of a mesh, evaluated or not; None if it has no groups."""
-    groups = obj.vertex_groups
+def read_groups(obj: bpy.types.Object, mesh: bpy.types.Mesh, owner: bpy.types.Object) -> VertexGroups | None:
+    """Read the groups of a mesh that an object shows; None if there are none.
+
+    Parameters
+    ----------
+    obj : bpy.types.Object
+    mesh : bpy.types.Mesh
+    owner : bpy.types.Object
+        The object, or as it is evaluated: geometry nodes may bring groups, and put them in another order.
+    """
+    groups = owner.vertex_groups
     if not len(groups):
         return None
     rows = [(vertex.index, element.group, element.weight) for vertex in mesh.vertices for element in vertex.groups]
@@ -52,7 +60,7 @@ def read_groups(obj: bpy.types.Object, mesh: bpy.types.Mesh) -> VertexGroups | N
         weights=weights,
         deforms=np.array([group.name in bones for group in groups], bool),
         locked=tuple(group.lock_weight for group in groups),
-        active=groups.active_index,
+        active=max(groups.find(obj.vertex_groups.active.name), 0) if obj.vertex_groups.active else 0,
     )
 
 

@@ -19,7 +19,7 @@ from .quadrics import LINED, PAIRS, WIDTH, cross, reduced
 
 # beside a distance of one across the surface: UV by the distance along the surface that it is off by, normals and
 # colours by the size of the mesh
-_WEIGHTS = {"uv": 0.15, "normal": 0.003, "color": 0.005}
+_WEIGHTS = {"uv": 0.15, "normal": 0.005, "color": 0.005}
 # slopes so many times the mean count no more than that: slivers have any
 _STEEP = 10.0
 # maps with less slope, of their values over the mesh, say nothing: a palette's

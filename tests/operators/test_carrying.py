@@ -6,6 +6,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
+from mathutils import Matrix
 
 from tests.bridge.blender_scenes import activate, add_sphere, linked_from_library
 
@@ -112,6 +113,30 @@ def test_weights_of_bones_are_normalised_and_limited(limit: int) -> None:
         assert len(weights) <= (2 if limit < 0 else limit)
         assert not weights or sum(weights) == pytest.approx(1, abs=1e-5)
     assert len(obj.data.vertices) == 642
+
+
+def test_groups_that_geometry_nodes_bring_keep_their_names() -> None:
+    other, obj = add_sphere(), add_sphere()
+    for owner, name, weight in ((other, "Theirs", 0.25), (obj, "Mine", 0.75)):
+        owner.vertex_groups.new(name=name).add(range(len(owner.data.vertices)), weight, "REPLACE")
+    other.data.transform(Matrix.Translation((4, 0, 0)))
+    tree = bpy.data.node_groups.new("Join", "GeometryNodeTree")
+    for way in ("INPUT", "OUTPUT"):
+        tree.interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")
+    start, info, join, end = (tree.nodes.new(kind) for kind in (
+        "NodeGroupInput", "GeometryNodeObjectInfo", "GeometryNodeJoinGeometry", "NodeGroupOutput"))
+    info.inputs[0].default_value = other
+    for output in (start.outputs[0], info.outputs["Geometry"]):  # the last comes first
+        tree.links.new(output, join.inputs[0])
+    tree.links.new(join.outputs[0], end.inputs[0])
+    obj.modifiers.new("Join", "NODES").node_group = tree
+    activate(obj)
+    simplify_active(ratio=0.3)
+    new = bpy.context.object
+    assert {group.name for group in new.vertex_groups} == {"Mine", "Theirs"}
+    for vertex in new.data.vertices:
+        found = {new.vertex_groups[element.group].name: element.weight for element in vertex.groups}
+        assert found == ({"Theirs": 0.25} if vertex.co.x > 2 else {"Mine": 0.75})
 
 
 def test_simulations_and_armatures_stay_live_while_others_are_applied() -> None:
