@@ -26,6 +26,9 @@ class Source(Protocol):
 
     dtype: np.dtype
 
+    def count(self) -> int:
+        """Count the triangles."""
+
     def blocks(self, size: int) -> Iterator[NDArray]:
         """Give the triangles, about so many at once: (b, 3, 3) positions."""
 
@@ -181,6 +184,10 @@ class Joined:
         """Find the points that cells share."""
         held = [np.load(folder / f"points_{cell}.npy")[np.load(folder / f"held_{cell}.npy")] for cell in cells]
         return cls(folder, cells, np.unique(np.concatenate([np.zeros((0, 3)), *held]), axis=0))
+
+    def count(self) -> int:
+        """Count the triangles."""
+        return sum(len(np.load(self.folder / f"corners_{cell}.npy", mmap_mode="r")) for cell in self.cells)
 
     def vertices(self) -> Iterator[NDArray[np.float64]]:
         """Give the vertices in blocks."""

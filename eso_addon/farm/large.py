@@ -24,7 +24,10 @@ Ints = NDArray[np.int64]
 WHOLE, CELL, FITTED, IDLE = 400, 600, 1500, 90 * 2**20
 _LEAST_CELL = 20_000
 _SPARE = 4  # how much finer than the goal the cells' levels are, if that fits
-_NEAR = 1.08  # the same for those that are followed by cells cut elsewhere: their borders stay that fine
+# times the goal: what rounds of cells leave where the whole never fits; each simplifies the borders of the one before
+_STEPS = (_SPARE, 2, 1.3, 1.08, 1)
+# times the root of a cell's triangles: so many must be left of it, for those along its border to be few among them
+_BORDER = 30.0
 _FURTHER = 4  # how much further a cell may have to go than another
 
 Run = Callable[[Sequence[Mapping[str, Any]]], Iterator[Mapping[str, Any]]]
@@ -135,12 +138,12 @@ def simplify_large(source: Source, target: Callable[[int], int], options: Mappin
     if plan.in_cell() < _LEAST_CELL:
         raise MeshError(f"{plan.memory / 2**20:.0f} MiB are too little for {plan.workers} worker(s): raise "
                         "--memory-limit or lower --workers")
-    before = sum(len(block) for block in source.blocks(_block(plan)))
+    before = source.count()
     if before == 0:
         raise MeshError("the mesh has no faces: there is nothing to simplify")
     goal = target(before)
     left, joined = before, source
-    goals = _goals(before, goal, plan.at_once(min(goal, before)))
+    goals = _goals(before, goal, plan.at_once(min(goal, before)), plan.in_cell())
     # what is followed by the whole is fitted then; cells are fitted round by round, the first time to the original
     fit = goal in goals and bool(options.get("refit", True))
     for number, wanted in enumerate(goals):
@@ -148,11 +151,11 @@ def simplify_large(source: Source, target: Callable[[int], int], options: Mappin
         joined = _round(joined, left, wanted, options, place, number, plan, fit=fit)
         if number:
             shutil.rmtree(folder / f"round_{number - 1}")
-        now = sum(len(block) for block in joined.faces())
+        now = joined.count()
         plan.tell(f"{left} triangles simplified to {now} in {len(joined.cells)} cells")
-        if now >= left and now > goal:
-            raise MeshError(f"the cells cannot be simplified below {now} triangles: raise --memory-limit")
-        left = now
+        stuck, left = now >= left, now
+        if stuck:
+            break
     if not isinstance(joined, Joined) or left > goal and left <= plan.at_once(goal):
         return _finish(joined, goal, before, options, plan)
     short = (f"stopped at {left} of {goal} triangles: no further edge can go without changing the topology",)
@@ -160,14 +163,25 @@ def simplify_large(source: Source, target: Callable[[int], int], options: Mappin
                  short if left > goal else ())
 
 
-def _goals(before: int, goal: int, at_once: int) -> list[int]:
-    """Return the triangles after each round of cells; what the last leaves is simplified as a whole, if it is more."""
+def _goals(before: int, goal: int, at_once: int, cell: int) -> list[int]:
+    """Return the triangles after each round of cells; what the last leaves is simplified as a whole, if it is more.
+
+    What stands along a round's borders stays as fine as it was, and the rest is the coarser for it: so the steps are
+    small, and the next round, whose cells are cut elsewhere, or the run on the whole makes up for it.
+    """
     if before <= at_once:
         return []
-    if goal * 1.5 <= at_once:
-        return [min(max(_SPARE * goal, before // 10), at_once)]
-    # the borders of each round are simplified in the next, and those of the last are nearly fine enough before it
-    return [wanted for wanted in (2 * goal, round(_NEAR * goal)) if wanted < before] + [goal]
+    if _SPARE * goal <= at_once:
+        last = [min(max(_SPARE * goal, before // 10), at_once)]
+    elif goal * 1.5 <= at_once:
+        last = [_SPARE * goal, min(2 * goal, at_once)]
+    else:
+        last = [round(step * goal) for step in _STEPS]
+    part = min(_BORDER / cell**0.5, 0.5)
+    first = [before]
+    while first[-1] * part > last[0]:
+        first.append(round(first[-1] * part))
+    return [*first[1:], *(wanted for wanted in last[:-1] if wanted < 0.9 * first[-1]), last[-1]]
 
 
 def _block(plan: Plan) -> int:

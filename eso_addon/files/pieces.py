@@ -35,6 +35,9 @@ class TriangleFile(Protocol):
     dtype: np.dtype
     left_behind: tuple[str, ...]
 
+    def count(self) -> int:
+        """Count the triangles."""
+
     def blocks(self, size: int) -> Iterator[NDArray]:
         """Give the triangles, about so many at once: (b, 3, 3) positions."""
 

@@ -22,6 +22,7 @@ _TYPES = {"char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4
           "float32": "f4", "float64": "f8"}
 _CORNERS = ("vertex_indices", "vertex_index")
 _CHUNK = 1 << 20  # bytes at once, where faces differ in size
+_COUNTED = 1 << 18  # triangles at once
 
 
 @dataclass
@@ -81,6 +82,10 @@ class PlyFile:
         least = sum(kind.itemsize for _, kind, _ in self._face.properties) * self.face_count
         if self.path.stat().st_size < self._face_start + least:
             raise FileFormatError(f"{self.path.name} is cut short: it promises {self.face_count} faces")
+
+    def count(self) -> int:
+        """Count the triangles; polygons count by the triangles that they become."""
+        return sum(len(corners) for corners in self._corners(_COUNTED))
 
     def blocks(self, size: int) -> Iterator[NDArray]:
         """Give the triangles in blocks: (b, 3, 3) of `dtype`."""

@@ -44,6 +44,10 @@ class StlFile:
                 raise FileFormatError(f"{self.path.name} is text: save it as binary to read it in pieces")
             raise FileFormatError(f"{self.path.name} is cut short: it promises {self.face_count} triangles")
 
+    def count(self) -> int:
+        """Count the triangles."""
+        return self.face_count
+
     def blocks(self, size: int) -> Iterator[NDArray]:
         """Give the triangles in blocks: (b, 3, 3) float32."""
         with open(self.path, "rb") as file:

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Meshes in cells: nothing is lost, no crack opens, the target is met, borders are as good as the rest."""
 
+import itertools
 import subprocess
 import sys
 from collections.abc import Iterator, Mapping, Sequence
@@ -12,13 +13,14 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from eso_addon.core.closest import ClosestPoints
 from eso_addon.core.deviation import measure
 from eso_addon.core.mesh import MeshError
 from eso_addon.core.simplify import simplify
 from eso_addon.farm import large
 from eso_addon.farm.cell import answer
 from eso_addon.farm.cells import CUTS, Joined, deal, plant
-from eso_addon.farm.large import Large, Plan, share, simplify_large
+from eso_addon.farm.large import Large, Plan, _goals, share, simplify_large
 from eso_addon.files.pieces import open_triangles
 from eso_addon.files.ply import write_ply
 from eso_addon.files.stl import write_stl
@@ -29,6 +31,9 @@ class Soup:
 
     def __init__(self, corners: np.ndarray) -> None:
         self.corners, self.dtype = corners, corners.dtype
+
+    def count(self) -> int:
+        return len(self.corners)
 
     def blocks(self, size: int) -> Iterator[np.ndarray]:
         for start in range(0, len(self.corners), size):
@@ -92,7 +97,7 @@ def test_no_crack_and_the_target(monkeypatch: pytest.MonkeyPatch, tmp_path: Path
     assert np.array_equal(np.concatenate(list(result.triangles())), points[corners])
 
 
-@pytest.mark.parametrize(("goal", "whole"), [(6000, 1), (1500, 7000)])
+@pytest.mark.parametrize(("goal", "whole"), [(6000, 1), (1500, 7000), (1500, 2400), (1500, 1)])
 def test_as_good_as_in_memory(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, goal: int, whole: int,
                               ring: tuple[np.ndarray, np.ndarray]) -> None:
     vertices, faces = ring
@@ -101,6 +106,37 @@ def test_as_good_as_in_memory(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, g
     there = measure(vertices, faces, *mesh_of(result), samples=40_000)
     here = measure(vertices, faces, once.vertices, once.faces, samples=40_000)
     assert there.symmetric.mean < 1.1 * here.symmetric.mean
+
+
+def test_borders_are_as_good_as_elsewhere(monkeypatch: pytest.MonkeyPatch, tmp_path: Path,
+                                          ring: tuple[np.ndarray, np.ndarray]) -> None:
+    vertices, faces = ring
+    trees = []
+    monkeypatch.setattr("eso_addon.farm.cells.plant", lambda *words: trees.append(plant(*words)) or trees[-1])
+    points, corners = mesh_of(in_cells(monkeypatch, tmp_path / "cells", Soup(vertices[faces]), 4000, cell=3000,
+                                       whole=1))
+    surface = ClosestPoints(vertices, faces)
+    far = np.sqrt(surface.query(points[corners].mean(axis=1))[2])
+    long = np.linalg.norm(points[corners] - points[np.roll(corners, 1, axis=1)], axis=2).mean(axis=1)
+    assert len(trees) > 3
+    for tree in trees:
+        cells = tree.cell_of(points)[corners]
+        near = np.isin(corners, corners[(cells != cells[:, :1]).any(axis=1)]).any(axis=1)
+        for values in (far, long):
+            assert 0.85 < values[near].mean() / values[~near].mean() < 1.15
+
+
+@given(before=st.integers(1, 10**9), part=st.floats(1e-4, 1), at_once=st.integers(0, 10**9),
+       cell=st.integers(20_000, 10**7))
+def test_rounds_go_down_in_steps(before: int, part: float, at_once: int, cell: int) -> None:
+    goal = max(round(before * part), 1)
+    left = [before, *_goals(before, goal, at_once, cell)]
+    assert len(left) < 40
+    assert all(fine >= coarse for fine, coarse in itertools.pairwise(left))
+    assert left[-1] <= max(at_once, goal)
+    assert goal in left or goal <= left[-1]
+    for fine, coarse in itertools.pairwise(left):  # what stands along a border of a full cell is few
+        assert coarse >= min(fine * min(30 / cell**0.5, 0.5), 4 * goal) * 0.99 - 1
 
 
 @given(count=st.integers(1, 300), distinct=st.integers(1, 40), most=st.integers(1, 100), cut=st.sampled_from(CUTS),

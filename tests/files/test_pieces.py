@@ -18,7 +18,9 @@ NUMBERS = {"i1": "char", "u1": "uchar", "<i2": "short", "<u2": "ushort", "<i4": 
 
 
 def soup(path: Path, size: int = 7) -> np.ndarray:
-    return np.concatenate([np.zeros((0, 3, 3)), *open_triangles(path).blocks(size)])
+    triangles = np.concatenate([np.zeros((0, 3, 3)), *open_triangles(path).blocks(size)])
+    assert len(triangles) == open_triangles(path).count()
+    return triangles
 
 
 def write_polygons(path: Path, vertices: np.ndarray, polygons: list[list[int]], *, order: str = "<", count: str = "u1",
