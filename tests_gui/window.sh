@@ -11,10 +11,12 @@ mkdir -p "$BLENDER_USER_RESOURCES"
 rm -f "$GUI_OUT"/*.png
 "$GUI_BLENDER" --command extension install-file -r user_default --enable "$zip"
 if [ -z "${DISPLAY:-}" ]; then
-    export LIBGL_ALWAYS_SOFTWARE=1 GALLIUM_DRIVER=llvmpipe DISPLAY=:99
-    Xvfb :99 -screen 0 "${size}x24" +extension GLX -nolisten tcp >"$GUI_OUT/screen.log" 2>&1 & screen=$!
+    export LIBGL_ALWAYS_SOFTWARE=1 GALLIUM_DRIVER=llvmpipe
+    # the screen takes a number that is free: others may have screens of their own
+    Xvfb -displayfd 1 -screen 0 "${size}x24" +extension GLX -nolisten tcp >"$GUI_OUT/display" 2>"$GUI_OUT/screen.log" & screen=$!
     trap 'kill $screen 2>/dev/null || true' EXIT
-    for _ in $(seq 100); do [ -S /tmp/.X11-unix/X99 ] && break; sleep 0.1; done
+    for _ in $(seq 200); do [ -s "$GUI_OUT/display" ] && break; sleep 0.1; done
+    export DISPLAY=":$(cat "$GUI_OUT/display")"
 fi
 timeout "$seconds" "$GUI_BLENDER" --enable-event-simulate --window-geometry 0 0 "${size%x*}" "${size#*x}" --python-exit-code 3 \
     --python-expr 'import bpy; bpy.context.preferences.view.show_splash = False' --python "$script" -- "$@"
