@@ -34,6 +34,7 @@ lint: $(READY)
 bench: $(READY_BENCH)
 	$(PY) -m benchmarks
 	$(PY) -m benchmarks --ablation --ratios 0.05 --repeat 1 --minutes 15
+	$(PY) -m benchmarks.viewer
 
 papers: $(READY)
 	$(PY) -m evidence $(if $(MODELS),--models "$(MODELS)")
