@@ -52,6 +52,10 @@ def _mesh_digest(obj: bpy.types.Object) -> str:
         if attribute.data_type in ATTRIBUTE_TYPES:
             digest.update(np.asarray(read_attribute(mesh, attribute.name)).tobytes())
     digest.update(repr([group.name for group in obj.vertex_groups]).encode())
+    if len(obj.vertex_groups):
+        weights = [(vertex.index, element.group, element.weight) for vertex in mesh.vertices
+                   for element in vertex.groups]
+        digest.update(np.array(weights, np.float64).tobytes())
     if mesh.shape_keys is not None:
         for key in mesh.shape_keys.key_blocks:
             points = np.zeros(len(key.data) * 3, np.float32)

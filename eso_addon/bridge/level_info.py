@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a level knows about itself: custom properties, for the panel, for scripts, and to make it again."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import bpy
@@ -67,10 +67,19 @@ def _can_be_source(obj: bpy.types.Object | None, level: bpy.types.Object) -> boo
     return obj is not None and obj.type == "MESH" and obj != level and LEVEL not in obj
 
 
-def is_stale(level: bpy.types.Object) -> bool:
-    """Tell whether the source was edited after the level was made."""
-    source = find_source(level)
-    return source is not None and HASH in level and level[HASH] != fingerprint(source)
+def stale_ones(levels: Iterable[bpy.types.Object]) -> list[bpy.types.Object]:
+    """Return the levels whose source was edited after they were made; each source is looked at once."""
+    now: dict[bpy.types.Object, str] = {}
+    found = []
+    for level in levels:
+        source = find_source(level)
+        if source is None or HASH not in level:
+            continue
+        if source not in now:
+            now[source] = fingerprint(source)
+        if level[HASH] != now[source]:
+            found.append(level)
+    return found
 
 
 def level_properties(source: bpy.types.Object, level: int, before: int, after: int, error: float, distance: float,

@@ -124,7 +124,7 @@ class OBJECT_OT_eso_lod_export(bpy.types.Operator):
         return [obj for obj in found if level_info.levels_of(obj)]
 
     def _stale_notes(self, context: bpy.types.Context) -> list[str]:
-        stale = [obj.name for obj in self._sources(context) if any(map(level_info.is_stale, level_info.levels_of(obj)))]
+        stale = [obj.name for obj in self._sources(context) if level_info.stale_ones(level_info.levels_of(obj))]
         return [f"Edited since: {', '.join(stale)}; update the levels, then export again"] if stale else []
 
     def _refused(self, error: Exception) -> set[str]:

@@ -117,7 +117,7 @@ class OBJECT_OT_eso_lod_update(EngineOperator, bpy.types.Operator):
             elif obj.type == "MESH" and level_info.levels_of(obj):
                 sources[obj] = None
         if self.only_stale:
-            return [obj for obj in sources if any(map(level_info.is_stale, level_info.levels_of(obj)))]
+            return [obj for obj in sources if level_info.stale_ones(level_info.levels_of(obj))]
         return list(sources)
 
 

@@ -33,10 +33,10 @@ def _is_remodelled(source: bpy.types.Object) -> bool:
 
 def refresh(levels: list[bpy.types.Object]) -> None:
     """Mark those levels that are stale, and only those."""
+    stale = set(level_info.stale_ones(levels))
     for level in levels:
-        stale = level_info.is_stale(level)
-        if bool(level.get(level_info.STALE, False)) != stale:
-            level[level_info.STALE] = stale
+        if bool(level.get(level_info.STALE, False)) != (level in stale):
+            level[level_info.STALE] = level in stale
 
 
 def register() -> None:

@@ -41,9 +41,11 @@ def test_levels_are_stale_once_their_source_is_edited() -> None:
     assert [level["eso_stale"] for level in levels()] == [False, False]
 
 
-@pytest.mark.parametrize("change", ["uv", "material", "group", "modifier"])
+@pytest.mark.parametrize("change", ["uv", "material", "group", "weight", "modifier"])
 def test_whatever_levels_are_made_from_makes_them_stale(change: str) -> None:
     obj = add_sphere()
+    leg = obj.vertex_groups.new(name="Leg")
+    leg.add([0, 1], 0.5, "REPLACE")
     generate(ratios="0.5")
     if change == "uv":
         obj.data.uv_layers[0].data[0].uv.x += 0.5
@@ -53,6 +55,8 @@ def test_whatever_levels_are_made_from_makes_them_stale(change: str) -> None:
         obj.data.polygons[3].material_index = 1
     elif change == "group":
         obj.vertex_groups.new(name="Arm")
+    elif change == "weight":
+        leg.add([1], 0.75, "REPLACE")
     else:
         obj.modifiers.new("Smooth", "SMOOTH")
     obj.data.update()
