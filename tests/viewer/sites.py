@@ -19,6 +19,7 @@ class Line(viewer_server._Handler):
     def _send_mesh(self, body: bool) -> None:
         site = self.server
         site.requests.append(self.headers.get("Range"))
+        site.times.append(time.monotonic())
         if site.status:
             return self._refuse(HTTPStatus(site.status), "as the test wants it")
         if not site.ranges:
@@ -57,6 +58,7 @@ class Site(MeshServer):
 
     def __init__(self, path: Path, port: int = 0) -> None:
         self.requests: list[str | None] = []
+        self.times: list[float] = []
         self.ranges, self.status, self.rate, self.sent = True, 0, 0.0, 0
         self.stop_after: int | None = None
         super().__init__(path, port)

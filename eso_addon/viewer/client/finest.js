@@ -10,7 +10,7 @@ const bytesOf = (array) => new Uint8Array(array.buffer, array.byteOffset, array.
  * so with each face from its lowest vertex on.
  */
 export function finest(mesh, turn) {
-  const { wedges, wedgeVertex, wedgePlace, positions, turned, faceCount } = mesh;
+  const { wedges, wedgeVertex, wedgePlace, positionBits: from, turned, faceCount } = mesh;
   const order = new Uint8Array(3 * faceCount); // rows of the stored faces, as the original has them
   const entries = new Int32Array(3 * faceCount); // wedges
   const faces = new Int32Array(3 * faceCount);
@@ -28,7 +28,7 @@ export function finest(mesh, turn) {
     }
   }
   const vertices = new Float32Array(3 * mesh.vertexCount);
-  const [to, from] = [vertices, positions].map((array) => new Int32Array(array.buffer)); // bit by bit
+  const to = new Int32Array(vertices.buffer);
   for (let w = 0; w < mesh.wedgeCount; w++) {
     for (let axis = 0; axis < 3; axis++) to[3 * wedgeVertex[w] + axis] = from[3 * wedgePlace[w] + axis];
   }

@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A mesh on its way up: places, faces, wedges and attributes, grown block by block.
-import { makeSplitter } from './batch.js';
-import { makeCoder } from './coder.js';
+import { makeSplits, split } from './batch.js';
 import { makeColumns } from './columns.js';
 import { check, inflate } from './container.js';
-import { makeGrid } from './positions.js';
+import { makeGrid, put } from './positions.js';
 
 export class Mesh {
   /** `head`: the mesh's entry of the header. `room`: { places, faces } that its arrays shall hold. */
@@ -17,8 +16,9 @@ export class Mesh {
     const ints = (count) => new Int32Array(count);
     this.head = head;
     this.wedged = wedged;
-    this.points = ints(4 * n); // on the grid of predictions; the fourth number is for `findArcs`
+    this.points = ints(4 * n); // on the grid of predictions; the fourth number is for `link`
     this.positions = new Float32Array(3 * n);
+    this.positionBits = new Int32Array(this.positions.buffer); // a signalling NaN must keep its bits
     this.faces = ints(3 * m); // places; faces beside the splits come first
     this.parents = ints(n).fill(-1);
     this.facesAfter = ints(n); // faces once each place is there
@@ -33,16 +33,16 @@ export class Mesh {
     const rows = { vertex: head.vertices, corner: w, face: m, side: m, edge: head.edges };
     this.attributes = head.attributes.map((entry) => makeAttribute(entry, rows));
     this.places = this.faceCount = this.wedgeCount = this.vertexCount = 0;
-    this.grid = makeGrid(head.grid, this.points, this.positions);
+    this.grid = makeGrid(head.grid);
   }
 
   /** Read the base block. */
   async base(bytes, places, count) {
-    const { head, faces, edges, grid } = this;
+    const { head, faces, edges } = this;
     const states = bytes.length - 4 * head.lanes;
     const columns = makeColumns(await inflate(bytes.subarray(0, states)));
     const [deltas, running] = columns;
-    for (let axis = 0; axis < 3; axis++) running(4, places).forEach((number, place) => grid.put(place, axis, number));
+    for (let axis = 0; axis < 3; axis++) running(4, places).forEach((number, place) => put(this, place, axis, number));
     const readPairs = (out, at, step, number, rows) => {
       const first = running(4, number);
       first.forEach((value, i) => (out[at + step * i] = value));
@@ -54,7 +54,7 @@ export class Mesh {
     this.faceCount = head.extra + count;
     check(faces.subarray(0, 3 * this.faceCount).every((place) => place >>> 0 < places));
     this.facesAfter.fill(this.faceCount, 0, places);
-    this.split = makeSplitter(this, makeCoder(bytes.subarray(states)));
+    this.splits = makeSplits(this, bytes.subarray(states));
     readPlaces(this, columns, 0);
     readWedges(this, columns, null, 0);
     readFaceValues(this, columns, 0, new Int32Array(this.faceCount));
@@ -69,7 +69,7 @@ export class Mesh {
     check(end <= bytes.length && plain % 4 === 0 && symbols % 2 === 0);
     const [first, firstFace] = [this.places, this.faceCount];
     const columns = makeColumns(await inflate(bytes.subarray(end)));
-    const arcs = this.split(bytes.subarray(8, 8 + symbols), bytes.subarray(8 + symbols, end), places, count + this.head.extra);
+    const arcs = split(this, bytes.subarray(8, 8 + symbols), bytes.subarray(8 + symbols, end), places, count + this.head.extra);
     readPlaces(this, columns, first);
     readWedges(this, columns, arcs, firstFace);
     readFaceValues(this, columns, firstFace, arcs.besides);

@@ -7,6 +7,7 @@ import { Mesh } from './mesh.js';
 const FIRST = 8192; // bytes asked for at first: the first picture comes from them
 const PATIENCE = 400; // milliseconds that the first picture waits for more than the base
 const STEP = 250; // milliseconds between pictures while more comes
+const SOON = 400; // where all comes within so many, it is waited for
 const now = () => performance.now();
 const { port1, port2 } = new MessageChannel();
 const breath = () => new Promise((resolve) => { port1.onmessage = resolve; port2.postMessage(0); });
@@ -262,15 +263,16 @@ export function makeStream(line, wish, show, tell) {
   function present(hurry) {
     if (!head || drawing || !mayBegin()) return;
     clearTimeout(timer);
-    const open = rows.find(wanted);
-    const rest = posted + STEP - now();
-    if (open && rest > 0 && !hurry) {
+    const open = rows.filter(wanted);
+    const due = open.reduce((sum, row) => sum + row.length - row.have, 0);
+    const rest = posted + (due < (speed * SOON) / 1000 ? SOON : STEP) - now();
+    if (open.length && rest > 0 && !hurry) {
       timer = setTimeout(present, rest);
       return;
     }
     let target = Math.min(levelFaces(), wish.cap);
     const left = there() - shown;
-    const wait = open && speed ? (1000 * (open.length - open.have)) / speed : 0;
+    const wait = due && speed ? (1000 * (open[0].length - open[0].have)) / speed : 0;
     if (wait > 1.5 * STEP && left > 0 && target > shown) {
       target = Math.min(target, shown + Math.ceil((left * 1.5 * STEP) / wait));
       timer = setTimeout(present, STEP);

@@ -4,7 +4,7 @@
 export const STYLE = `
 :host { display: block; position: relative; height: 480px; min-height: 240px; border-radius: 12px; overflow: hidden;
   contain: content; container-type: inline-size; color-scheme: light dark;
-  --ink: light-dark(#1b2430, #e8edf5); --soft: light-dark(#5c6878, #9aa7b8); --card: light-dark(#ffffffd9, #1b212bd9);
+  --ink: light-dark(#1b2430, #e8edf5); --soft: light-dark(#5c6878, #9aa7b8); --card: light-dark(#ffffffe6, #1b212be6);
   --rim: light-dark(#1b24301f, #ffffff26); --back: light-dark(#f4f6f9, #262d38); --edge: light-dark(#d5dbe4, #10141a);
   --accent: light-dark(#2563eb, #7aa7ff); --good: light-dark(#0f7a45, #5fd39a); --bad: light-dark(#b3261e, #ff9a92);
   color: var(--ink); accent-color: var(--accent); font: 14px/1.4 system-ui, sans-serif;
@@ -12,7 +12,7 @@ export const STYLE = `
 [hidden] { display: none !important; }
 canvas { position: absolute; inset: 0; width: 100%; height: 100%; cursor: grab; outline-offset: -2px; touch-action: none; }
 .card { position: absolute; left: 50%; transform: translateX(-50%); box-sizing: border-box; background: var(--card);
-  border: 1px solid var(--rim); border-radius: 14px; padding: 10px 14px 12px; backdrop-filter: blur(14px); }
+  border: 1px solid var(--rim); border-radius: 14px; padding: 10px 14px 12px; }
 header { position: absolute; inset: 14px 14px auto; pointer-events: none; overflow-wrap: anywhere; }
 b { font-size: 17px; margin-right: 8px; }
 .state, dt, small, label { color: var(--soft); }

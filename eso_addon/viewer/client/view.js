@@ -2,7 +2,7 @@
 // The picture: buffers of the meshes' levels, objects, materials, light and camera.
 import {
   Box3, BufferAttribute, BufferGeometry, Color, DataTexture, DirectionalLight, DoubleSide, Frustum, Group, HemisphereLight,
-  LineBasicMaterial, LineSegments, Matrix4, Mesh, MeshStandardMaterial, PerspectiveCamera, RepeatWrapping, Scene, Sphere, SRGBColorSpace,
+  LineBasicMaterial, LineSegments, Matrix4, Mesh, MeshPhongMaterial, PerspectiveCamera, RepeatWrapping, Scene, Sphere, SRGBColorSpace,
   Vector3, WebGLRenderer,
 } from './three.module.js';
 import { makeOrbit } from './orbit.js';
@@ -119,9 +119,9 @@ export function makeView(canvas, settings, { drawn, look: moved, say, below }) {
     const key = [color, vertexColors, flatShading, map, wire].join();
     if (!materials.has(key)) {
       const [red, green, blue, opacity = 1] = color || [];
-      materials.set(key, new MeshStandardMaterial({
+      materials.set(key, new MeshPhongMaterial({
         color: color ? new Color(red, green, blue) : vertexColors || map ? 0xffffff : CLAY,
-        roughness: 0.62, side: DoubleSide, flatShading, vertexColors, map, transparent: opacity < 1, opacity,
+        specular: 0x1c1c1c, shininess: 12, side: DoubleSide, flatShading, vertexColors, map, transparent: opacity < 1, opacity,
         polygonOffset: wire, polygonOffsetFactor: 1, polygonOffsetUnits: 1,
       }));
     }
