@@ -9,6 +9,7 @@ from ..operators import level_slide, shown
 from ..operators.level_figures import level_figures
 from ..operators.lod_polls import why_not_generate, why_not_update
 from ..operators.polls import active_triangles, why_not_in_place, why_not_measure, why_not_simplify
+from ..settings.profiles import PROFILES
 from .presets import VIEW3D_MT_eso_level_sets, VIEW3D_PT_eso_presets
 
 _STREAM = (
@@ -106,6 +107,12 @@ class VIEW3D_PT_eso_levels(_SidebarPanel, bpy.types.Panel):
         reason = why_not_update(context)
         _draw_button(context, layout, "object.eso_lod_update", "Update LODs", "FILE_REFRESH", reason, scale=1.0,
                      told=False)  # fmt: skip
+        profile = PROFILES[settings.profile]
+        offers = ((profile.hull, "object.eso_lod_hulls", "Collision Hulls", "MESH_ICOSPHERE"),
+                  (profile.normal_maps, "object.eso_lod_bake", "Bake Normals", "RENDER_STILL"))  # fmt: skip
+        for used, operator, text, icon in offers:
+            if used:
+                _draw_button(context, layout, operator, text, icon, reason, scale=1.0, told=False)
         _draw_button(context, layout, "object.eso_lod_export", "Export LODs", "EXPORT", reason, scale=1.0)
 
 
