@@ -114,8 +114,10 @@ def scene_panel() -> Steps:
     fresh()
     view = bpy.context.preferences.view
     view.smooth_view, view.filebrowser_display_type = 0, "SCREEN"
+    yield from w.still()
     before = w.part(w.capture(), w.view())
     yield from w.sidebar()
+    yield from w.still()
     area = w.region("UI")
     after = w.part(w.picture("panel"), w.view())
     changed = np.abs(after.astype(int) - before)[:, -area.width :].max(axis=2) > BLANK
@@ -295,6 +297,7 @@ def scene_slider() -> Steps:
 def scene_overlays() -> Steps:
     """See weights, edges and deviation in colours."""
     fresh()
+    yield from w.still()
     plain = colorful(w.part(w.capture(), w.region("WINDOW")))
     for kind, operator, x in (("weights", "object.eso_weights_show", 0.2), ("edges", "object.eso_edges_show", 0.5)):
         yield from w.press_button(operator, x=x)
@@ -371,7 +374,7 @@ def scene_six_clicks() -> Steps:
     clicks += 1
     yield from w.wait_for(lambda: bool(list(home.glob("*.fbx"))), 30, "the file")
     yield from w.wait_for(lambda: is_open("VIEW_3D"), 10, "the viewport")
-    yield 1.0
+    yield from w.clear_sidebar()
     w.picture("step6_exported")
     FIGURES["clicks from the installed add-on to Unity LODs"] = clicks
     assert clicks <= 6

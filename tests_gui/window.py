@@ -42,7 +42,18 @@ def clear_sidebar() -> Steps:
     yield 0.2
     place = region("WINDOW")
     move(place.x + 120, place.y + place.height - 200)
-    yield 0.4
+    yield from still()
+
+
+def still(most: float = 5) -> Steps:
+    """Wait until the window has drawn all that it has to draw: two pictures are the same."""
+    end, before = time.monotonic() + most, None
+    while time.monotonic() < end:
+        yield 0.4
+        after = capture()
+        if before is not None and np.array_equal(before, after):
+            return
+        before = after
 
 
 def look_at_object() -> None:
