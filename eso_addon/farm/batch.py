@@ -20,6 +20,7 @@ from .ledger import Ledger, Row
 from .library import Entry
 
 _LOST = 5  # times that a file is handed out anew after Dask gave up on the workers that had it
+_STARTS = 20  # times that the workers here are started
 PATIENCE = 15.0  # seconds to wait for a scheduler
 _NEEDED = "a batch runs on Dask, which is not there: pip install 'eso-lod[farm]' (or pip install dask distributed)"
 
@@ -174,7 +175,7 @@ def client_of(farm: Farm) -> Iterator[Any]:
 def _started(make: Callable[..., Any], workers: int) -> Any:  # noqa: ANN401 - Dask's cluster
     """Start workers here; one that is killed while it starts has Dask give up on all, so that it is tried again."""
     board = "127.0.0.1:0" if importlib.util.find_spec("bokeh") else None
-    for _ in range(_LOST):
+    for _ in range(_STARTS):
         try:
             # no limit of memory: it is the child's, and watched there
             return make(n_workers=workers, threads_per_worker=1, processes=True, memory_limit=None,

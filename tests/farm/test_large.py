@@ -4,6 +4,7 @@
 import itertools
 import subprocess
 import sys
+import time
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -179,17 +180,33 @@ def test_shares_add_up(sizes: list[int], part: float, seed: int) -> None:
 
 @pytest.mark.parametrize("ending", [".ply", ".stl"])
 def test_command_line(tmp_path: Path, root: Path, ending: str) -> None:
-    vertices, faces = torus(180, 500)
+    vertices, faces = torus(300, 500)
     source, target = tmp_path / f"in{ending}", tmp_path / f"out{ending}"
     if ending == ".ply":
         write_ply(source, [vertices], [faces])
     else:
         write_stl(source, [vertices[faces]])
     # a process of its own: what this one holds counts
-    subprocess.run([sys.executable, "-m", "eso_addon", "simplify", source, target, "--ratio", "0.05", "--memory-limit",
-                    "240M", "--workers", "1", "--json", tmp_path / "figures.json"], check=True, cwd=root)
-    assert sum(len(block) for block in open_triangles(target).blocks(1000)) == 9000
+    words = ["--ratio", "0.05", "--memory-limit", "200M", "--workers", "1", "--json", tmp_path / "figures.json"]
+    done = subprocess.run([sys.executable, "-m", "eso_addon", "simplify", source, target, *words], check=True, cwd=root,
+                          capture_output=True, text=True)
+    assert "300000 triangles simplified to" in done.stdout  # in cells, and not as a whole
+    assert sum(len(block) for block in open_triangles(target).blocks(1000)) == 15_000
     assert sorted(path.name for path in tmp_path.iterdir()) == ["figures.json", f"in{ending}", f"out{ending}"]
+
+
+def test_a_run_that_is_stopped_leaves_nothing(tmp_path: Path, root: Path) -> None:
+    vertices, faces = torus(300, 500)
+    write_ply(tmp_path / "in.ply", [vertices], [faces])
+    run = subprocess.Popen([sys.executable, "-m", "eso_addon", "simplify", tmp_path / "in.ply", tmp_path / "out.ply",
+                            "--ratio", "0.05", "--memory-limit", "200M"], cwd=root, stderr=subprocess.PIPE, text=True)
+    ends = time.monotonic() + 120
+    while not list(tmp_path.glob(".eso_lod_*/round_0/cell_*")) and time.monotonic() < ends:
+        time.sleep(0.05)
+    run.terminate()
+    assert run.communicate(timeout=120)[1] == "eso_lod: stopped: out.ply was not written\n"
+    assert run.returncode == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["in.ply"]
 
 
 @pytest.mark.parametrize(("words", "told"), [
