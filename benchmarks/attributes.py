@@ -41,10 +41,33 @@ def main(argv: Sequence[str] | None = None) -> None:
     parser.add_argument("--option", action="append", default=[], metavar="NAME=VALUE", help="of the engine")
     args = parser.parse_args(argv)
     options = {name: _value(value) for name, _, value in (text.partition("=") for text in args.option)}
+    every: list[str] = []
     for name in args.names.split(","):
         for ratio in map(float, args.ratios.split(",")):
-            for line in compare(args.models / name, ratio, args.render, options):
-                print(line, flush=True)
+            lines = compare(args.models / name, ratio, args.render, options)
+            print("\n".join(lines), flush=True)
+            every += lines
+    print("\n".join(table(every)))
+
+
+def table(lines: Sequence[str]) -> list[str]:
+    """Return a table in Markdown: the figures of each mesh, from what `compare` says, as parts of Decimate's."""
+    rows: dict[str, dict[str, str]] = {}
+    for line in lines:
+        if not line.startswith(" "):
+            row = rows.setdefault(line.split(";")[0].split(" -> ")[0].rsplit(":", 1)[0], {})
+            engine, bare = (float(text.split(" s")[0]) for text in line.split("engine ")[1].split(" (")[:2])
+            row["time, of that without attributes"] = f"{engine / max(bare, 1e-3):.2f}"
+        elif line.endswith("none"):
+            row[line[4:32].strip()] = line.split()[-2]
+        else:
+            ours, theirs, part = line.split()[-3:]
+            row[line[4:32].strip()] = f"{ours} of {theirs}" if "turned" in line else part
+    titles = list(dict.fromkeys(title for row in rows.values() for title in row))
+    cells = [["mesh, part of triangles", *titles]]
+    cells += [[name, *(row.get(title, "") for title in titles)] for name, row in rows.items()]
+    cells.insert(1, ["---"] * len(cells[0]))
+    return [f"| {' | '.join(row)} |" for row in cells]
 
 
 def _value(text: str) -> object:
