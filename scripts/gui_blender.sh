@@ -8,14 +8,14 @@
 # BLENDER=PATH       use this Blender; without a display, on a virtual screen (needs Xvfb), pictures by ImageMagick
 # otherwise          a Debian with Blender is put into a folder of its own (root only): GUI_SUITE=sid (Blender 5.2 LTS) or
 #                    trixie (4.3), about 1.3 GB and two minutes, in GUI_ROOT, by default below ~/.cache/eso-lod
-# GUI_SIZE=1440x960  the screen;  GUI_SECONDS=900  the longest that it may take
+# GUI_SIZE=1440x960  the screen;  GUI_SECONDS=1800  the longest that it may take
 #
 # The machine's own packages stay as they are; mounts and processes are private and end with the run.
 set -euo pipefail
 SUITE=${GUI_SUITE:-sid}
 ROOT=${GUI_ROOT:-${XDG_CACHE_HOME:-$HOME/.cache}/eso-lod/$SUITE}
 SIZE=${GUI_SIZE:-1440x960}
-SECONDS_MOST=${GUI_SECONDS:-900}
+SECONDS_MOST=${GUI_SECONDS:-1800}
 PACKAGES="blender xvfb xauth imagemagick libopengl0 python3-numpy python3-requests python3-zstandard python3-cattr"
 
 mirror() {  # where this machine gets Debian from
