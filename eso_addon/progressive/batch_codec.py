@@ -17,10 +17,13 @@ from .models import Model
 from .splits import Arcs, openings, walk
 
 _ESCAPE = 15
+_LEAVES = "the stream is damaged: a split leaves the surface; fetch the file again"
 
 
 class Mesh:
     """The mesh on its way up; arrays have room for the whole, their rows side by side.
+
+    All begin as zeros: room for counts that damage has made large costs no memory until something is there.
 
     Attributes
     ----------
@@ -43,7 +46,7 @@ class Mesh:
         self.points = self.numbers if grid.kind != 2 else np.zeros((3, vertices), np.int64)
         self.short = self.points if grid.shift == 0 else np.zeros((3, vertices), np.int64)
         self.faces = np.zeros((3, faces), np.int64)
-        self.parents = np.full(vertices, -1)
+        self.parents = np.zeros(vertices, np.int64)
         self.degree = np.zeros(vertices, np.int64)
         self.vertex_count = self.face_count = 0
 
@@ -114,8 +117,12 @@ def code_batch(coder: Writer | Reader, models: Connectivity, shape: Shape, mesh:
     fans = fans_at(mesh.faces[:, : mesh.face_count], chosen)
     degree = mesh.degree.take(vertex)
     length = _code_small(coder, models.length, np.minimum(degree, 15), None if known is None else known.length)
+    if (length > degree).any():
+        raise StreamError(_LEAVES)
     start = _code_start(coder, models.start, mesh, fans, label.take(fans.vertex), degree, vertex, length, known)
     arcs = walk(fans, start, length)
+    if not arcs.whole.all():
+        raise StreamError(_LEAVES)
     there = _code_sides(coder, models.sides, fans, start, length, arcs, known)
     new = count + np.arange(splits)
     slot = fans.slot.take(arcs.corner)
@@ -175,17 +182,19 @@ def _code_start(coder: Writer | Reader, model: Model, mesh: Mesh, fans: Fans, ow
         pull = np.bincount(own, off, splits).astype(np.int64)
         off *= (pull // degree).take(own)
         toward += off
-    window = toward.copy()
-    current, step = np.arange(corners), 1
+    window, step = toward.copy(), 1
     steps = np.minimum(length, 8).take(own)
     left = np.flatnonzero(steps > step)
+    onward = left
     while len(left):
-        onward = fans.successor.take(current.take(left))
-        left, onward = left[onward >= 0], onward[onward >= 0]
-        current[left] = onward
+        onward = fans.successor.take(onward)
+        if onward.min() < 0:  # at the end of an open fan
+            there = np.flatnonzero(onward >= 0)
+            left, onward = left.take(there), onward.take(there)
         window[left] += toward.take(onward)
         step += 1
-        left = left[steps.take(left) > step]
+        further = np.flatnonzero(steps.take(left) > step)
+        left, onward = left.take(further), onward.take(further)
     # by likelihood in single precision, equal ones in the order of the corners' slots; then by split
     order = sorting_order(place_of(-window) + (1 << 31))
     order = order.take(sorting_order(own.take(order)))
@@ -193,7 +202,7 @@ def _code_start(coder: Writer | Reader, model: Model, mesh: Mesh, fans: Fans, ow
     rank = None
     context = np.minimum(degree, 15) * 8 + np.minimum(length, 7)
     if known is not None:
-        place = np.full(3 * mesh.face_count, -1)
+        place = np.empty(3 * mesh.face_count, np.int64)
         place[fans.slot] = np.arange(corners)
         inverse = np.empty(corners, np.int64)
         inverse[order] = np.arange(corners)

@@ -25,7 +25,7 @@ from .fans import fans_at
 # batches are filled up once more than simplification asks: half as many are quicker to make, to write and to read
 _PASSES = 2
 # two closed fans have at least so many faces
-_TWO_FANS = 6
+_TWO_FANS = 4
 
 
 def prepared(points: Floats, faces: Ints) -> Prepared | None:

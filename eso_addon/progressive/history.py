@@ -238,7 +238,7 @@ class _Attempt:
         self.bad[good[wrong]] = True
         good, final = good[~wrong], final[~wrong]
         arcs = walk(fans, self.start.take(good), self.length.take(good))
-        self.bad[good[arcs.last != final]] = True
+        self.bad[good[(arcs.last != final) | ~arcs.whole]] = True
 
     def _find_bare(self) -> None:
         """Find the corner beside which a lone face opens."""

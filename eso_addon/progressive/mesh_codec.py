@@ -56,6 +56,7 @@ class _Codec:
             faces = self.base_faces
         mesh.faces[:, :width] = _code_faces(block, faces if known else None, width, count)
         mesh.face_count = width
+        mesh.parents[:count] = -1
         mesh.degree[:count] = np.bincount(mesh.faces[:, :width].ravel(), minlength=count)
         extra = self.header["extra"]
         patches.extra = _code_faces(block, patches.extra if known else None, extra, count)
@@ -414,8 +415,8 @@ def _empty_patches(header: dict[str, Any], places: Ints, faces: Ints, errors: np
     wedges = header["wedges"] if "wedges" in header["needs"] else count
     none, no_faces = np.zeros(0, np.int64), np.zeros((3, 0), np.int64)
     return Patches(np.zeros((0, 3), np.float32), none, no_faces, [], places, faces, no_faces,
-                   np.zeros(count + 1, np.int64), np.full(wedges, -1), np.zeros(wedges, np.int64), no_faces, no_faces,
-                   np.zeros(width, np.uint8), np.zeros((0, 2), np.int64), {}, None, None, None, errors,
+                   np.zeros(count + 1, np.int64), np.zeros(wedges, np.int64), np.zeros(wedges, np.int64), no_faces,
+                   no_faces, np.zeros(width, np.uint8), np.zeros((0, 2), np.int64), {}, None, None, None, errors,
                    np.zeros(count, np.uint8))
 
 

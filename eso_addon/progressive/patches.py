@@ -19,6 +19,8 @@ from .polygons import is_apart
 from .source import Source, distinct, rows_as_bytes
 
 _ROUNDS = 12
+# the engine runs again while each run leaves less than this part of the faces
+_WORTHWHILE = 0.9
 
 
 @dataclass
@@ -105,7 +107,7 @@ def make_patches(source: Source, target: int, options: dict[str, Any]) -> Genera
     batches: list[Batch] = []
     costs = np.zeros(len(points))
     for attempt in range(_ROUNDS):
-        held = int(unwinding.held.sum())
+        held, faces_before = int(unwinding.held.sum()), unwinding.faces.shape[1]
         if attempt:
             mesh = prepared(points, unwinding.faces.T)
             if mesh is None:
@@ -117,7 +119,8 @@ def make_patches(source: Source, target: int, options: dict[str, Any]) -> Genera
         removed, kept = mesh.source.take(record.removed), mesh.source.take(record.kept)
         costs[removed] = record.cost
         batches += _carried_out(unwinding, removed, kept, record.batch_starts)
-        if int(unwinding.held.sum()) == held:
+        # what holds the engine up costs it as much time again in every run
+        if int(unwinding.held.sum()) == held or unwinding.faces.shape[1] > _WORTHWHILE * faces_before:
             break
         unwinding.frozen[:] = False
     numbering = _Numbering(source, unwinding, faces, batches[::-1], corner)

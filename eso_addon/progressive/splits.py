@@ -13,10 +13,7 @@ import numpy as np
 
 from ..core.adjacency import sorting_order
 from ..core.mesh import Bools, Ints
-from .errors import StreamError
 from .fans import Fans
-
-_LEAVES = "the stream is damaged: a split leaves the surface; fetch the file again"
 
 
 @dataclass(frozen=True)
@@ -31,6 +28,8 @@ class Arcs:
         The last corner of each arc; the start where it has none.
     first_ring, last_ring : ndarray, (k,) int64
         The ring vertices x and y at which `before` and `after` open.
+    whole : ndarray, (k,) bool
+        False where an arc is longer than its fan.
     """
 
     split: Ints
@@ -38,6 +37,7 @@ class Arcs:
     last: Ints
     first_ring: Ints
     last_ring: Ints
+    whole: Bools
 
     def settle(self, bare: Ints, before: Bools) -> None:
         """Let both new edges of arcs without corners end at one ring vertex: of a lone face `before`, or `after`."""
@@ -47,35 +47,29 @@ class Arcs:
 
 
 def walk(fans: Fans, start: Ints, length: Ints) -> Arcs:
-    """Follow each arc from its start; see `Arcs.settle` for arcs without corners.
-
-    Raises
-    ------
-    StreamError
-        An arc is longer than its fan.
-    """
+    """Follow each arc from its start; see `Arcs.settle` for arcs without corners."""
+    whole = np.ones(len(start), bool)
     last = start.copy()
     chosen = np.flatnonzero(length > 0)
     current = start.take(chosen)
     splits, corners = [chosen], [current]
     step = 1
-    while True:
+    while len(chosen):
         further = np.flatnonzero(length.take(chosen) > step)
-        if len(further) == 0:
-            break
         chosen, current = chosen.take(further), fans.successor.take(current.take(further))
-        if current.min() < 0 or step > len(fans.slot):
-            raise StreamError(_LEAVES)
+        if current.min(initial=0) < 0:
+            there = np.flatnonzero(current >= 0)
+            whole[np.delete(chosen, there)] = False
+            chosen, current = chosen.take(there), current.take(there)
         splits.append(chosen)
         corners.append(current)
         last[chosen] = current
         step += 1
-    corner = np.concatenate(corners)
-    met = np.zeros(len(fans.slot), bool)
-    met[corner] = True
-    if np.count_nonzero(met) < len(corner):  # one goes around its fan more than once
-        raise StreamError(_LEAVES)
-    return Arcs(np.concatenate(splits), corner, last, fans.following.take(start), fans.preceding.take(last))
+    split, corner = np.concatenate(splits), np.concatenate(corners)
+    times = np.bincount(corner, minlength=1)
+    if times.max() > 1:  # one goes around its fan more than once
+        whole[split[times.take(corner) > 1]] = False
+    return Arcs(split, corner, last, fans.following.take(start), fans.preceding.take(last), whole)
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ import numpy as np
 from ..core.mesh import Ints
 from . import container
 from .container import Container
+from .errors import StreamError
 from .mesh_codec import EncodedMesh, decode_mesh
 from .patches import Patches
 
@@ -56,5 +57,8 @@ def decode(data: bytes, *, partial: bool = False) -> tuple[list[tuple[EncodedMes
         optional = {name: block for (name, mesh), block in parts.optional.items() if mesh == index}
         mesh = EncodedMesh(header, blocks, table["places"][own].astype(np.int64), table["faces"][own].astype(np.int64),
                            table["error"][own].astype(np.float64), optional)
-        meshes.append((mesh, decode_mesh(mesh)))
+        try:
+            meshes.append((mesh, decode_mesh(mesh)))
+        except MemoryError:
+            raise StreamError("the stream says that it holds more than memory does: fetch the file again") from None
     return meshes, parts.header.get("meta", {}), parts.damage

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from eso_addon.progressive import container
+from eso_addon.progressive import container, stream
 from eso_addon.progressive.errors import StreamError
 from eso_addon.progressive.progressive import Progressive, from_bytes, progressive
 
@@ -136,6 +136,15 @@ def test_what_once_failed() -> None:
     points, faces = grid(4, 4, np.random.default_rng(0))
     points.view(np.uint32)[0, 0] = 0x7F800001
     assert use(progressive(points, faces).to_bytes(), partial=False) is not None
+
+
+def test_what_memory_does_not_hold_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: object) -> None:
+        raise MemoryError
+
+    monkeypatch.setattr(stream, "decode_mesh", fail)
+    with pytest.raises(StreamError, match="more than memory"):
+        from_bytes(STREAMS[0])
 
 
 def test_a_failed_save_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -59,6 +59,16 @@ def test_every_prefix_is_a_mesh(mesh: Arrays) -> None:
                 assert (area_vectors(level.vertices, level.faces) == 0).all(axis=1).sum() <= flat_before
 
 
+@pytest.mark.parametrize("sheets", [2, 3])
+def test_closed_fans_of_two_faces_meet_at_a_vertex(sheets: int) -> None:
+    rng = np.random.default_rng(sheets)
+    corners = 1 + 2 * np.arange(sheets)[:, None]
+    front = np.concatenate((np.zeros_like(corners), corners, corners + 1), axis=1)
+    faces = np.concatenate((front, front[:, ::-1]))
+    mesh = {"vertices": rng.random((1 + 2 * sheets, 3)).astype(np.float32), "faces": faces}
+    assert same(mesh, from_bytes(progressive(**mesh, base_faces=1).to_bytes(keep_order=True)).restore())
+
+
 @pytest.mark.parametrize("bits", [8, 12, 16])
 def test_quantised_within_half_a_step(bits: int) -> None:
     points, faces = grid(20, 20, np.random.default_rng(0), closed=True)
