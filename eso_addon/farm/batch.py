@@ -154,7 +154,9 @@ def client_of(farm: Farm) -> Iterator[Any]:
         raise ValueError(_NEEDED) from None
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
     quiet = {"logging.distributed": "critical", "distributed.scheduler.allowed-failures": 20,
-             "distributed.comm.timeouts.connect": "15s"}
+             "distributed.comm.timeouts.connect": "15s",
+             # a cluster drops a worker that was killed and takes longer than this to be back, and never replaces it
+             "distributed.deploy.lost-worker-timeout": "1000 hours"}
     with ExitStack() as stack:
         stack.enter_context(warnings.catch_warnings())
         warnings.simplefilter("ignore")
