@@ -95,7 +95,7 @@ def test_a_level_asks_for_no_more_than_it_needs(page: Page, site: Start) -> None
 
 
 def test_pause_and_go_on(page: Page, site: Start) -> None:
-    page.goto(f"{site().url}?budget=8000&level=1")
+    page.goto(f"{site().url}?budget=2000")
     until(page, "s.shown > 0")
     page.locator("eso-viewer >> css=.play").click()
     page.wait_for_timeout(300)

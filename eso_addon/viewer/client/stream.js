@@ -7,7 +7,7 @@ import { Mesh } from './mesh.js';
 const FIRST = 8192; // bytes asked for at first: the first picture comes from them
 const PATIENCE = 400; // milliseconds that the first picture waits for more than the base
 const STEP = 250; // milliseconds between pictures while more comes
-const SOON = 400; // where all comes within so many, it is waited for
+const BUSY = 1000; // and where it is not the line that takes the time
 const now = () => performance.now();
 const { port1, port2 } = new MessageChannel();
 const breath = () => new Promise((resolve) => { port1.onmessage = resolve; port2.postMessage(0); });
@@ -153,11 +153,12 @@ export function makeStream(line, wish, show, tell) {
   /** Fetch and decode what is wanted next; false where nothing is. */
   async function next() {
     if (head) await decode();
-    const asked = span();
+    const most = span() && (await allowance());
+    const asked = span(); // meanwhile the wish may have changed
     if (!asked) return false;
     let [begin, end] = asked;
     check(!line.size || begin < line.size, 'The file is cut short. What came is shown.');
-    end = Math.min(end, begin + await allowance());
+    end = Math.min(end, begin + most);
     abort = new AbortController();
     const { signal } = abort;
     try {
@@ -264,15 +265,14 @@ export function makeStream(line, wish, show, tell) {
     if (!head || drawing || !mayBegin()) return;
     clearTimeout(timer);
     const open = rows.filter(wanted);
-    const due = open.reduce((sum, row) => sum + row.length - row.have, 0);
-    const rest = posted + (due < (speed * SOON) / 1000 ? SOON : STEP) - now();
+    const rest = posted + (2 * busy > now() - begun ? BUSY : STEP) - now();
     if (open.length && rest > 0 && !hurry) {
       timer = setTimeout(present, rest);
       return;
     }
     let target = Math.min(levelFaces(), wish.cap);
     const left = there() - shown;
-    const wait = due && speed ? (1000 * (open[0].length - open[0].have)) / speed : 0;
+    const wait = open.length && speed ? (1000 * (open[0].length - open[0].have)) / speed : 0;
     if (wait > 1.5 * STEP && left > 0 && target > shown) {
       target = Math.min(target, shown + Math.ceil((left * 1.5 * STEP) / wait));
       timer = setTimeout(present, STEP);

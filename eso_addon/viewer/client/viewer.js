@@ -7,6 +7,7 @@ const USUAL = {
   paused: false,
 };
 const CAP = 2e5; // triangles at first where the time of a picture matters
+const LARGEST = 1e9;
 
 /** Settings from the tag, then from the page's address where the tag says so. */
 function readSettings(element) {
@@ -23,13 +24,17 @@ function readSettings(element) {
   return settings;
 }
 
-/** Start the worker, also where this file lies on another server than the page. */
-function makeWorker() {
+/**
+ * Start the worker, also where this file lies on another server than the page. What to load goes along as its name: a message would
+ * wait until this thread has read three.js.
+ */
+function makeWorker(what) {
+  const name = JSON.stringify(what);
   const given = globalThis.ESO_WORKER;
-  if (given) return new Worker(given);
+  if (given) return new Worker(given, { name });
   const url = new URL('./worker.js', import.meta.url).href;
   const text = new Blob([`import ${JSON.stringify(url)};`], { type: 'text/javascript' });
-  return new Worker(url.startsWith(`${location.origin}/`) ? url : URL.createObjectURL(text), { type: 'module' });
+  return new Worker(url.startsWith(`${location.origin}/`) ? url : URL.createObjectURL(text), { type: 'module', name });
 }
 
 class EsoViewer extends HTMLElement {
@@ -50,7 +55,12 @@ function begin(element) {
   const source = element.getAttribute('src') ?? '';
   const state = { received: 0, bytes: 0, shown: 0, there: 0, faces: 0, rate: 0, splits: 0, errors: [], message: '', identical: false };
   const dumps = new Map();
-  const worker = makeWorker();
+  const { budget, error, level: part, paused, memory } = settings;
+  const held = document.getElementById(element.getAttribute('held'))?.textContent;
+  let cap = settings.frame ? CAP : LARGEST;
+  const worker = makeWorker({
+    url: held ? null : new URL(source, document.baseURI).href, wish: { budget, error, level: part, paused, memory: memory * 1e6, cap },
+  });
   const post = (type, more) => worker.postMessage({ type, ...more });
   const wish = (one) => post('wish', { wish: one });
   let view;
@@ -58,7 +68,6 @@ function begin(element) {
   let news; // the name of an event once the level is drawn
   let frames = [];
   let lastFrame = 0;
-  let cap;
   let looking;
   let telling;
 
@@ -78,13 +87,7 @@ function begin(element) {
   for (const one of Object.keys(settings)) panel.setting(one, settings[one]);
   panel.title(name ?? source.split('/').pop().replace(/\.esopm$/, ''));
 
-  // the worker is at work before three.js is there
-  const { budget, error, paused, memory } = settings;
-  cap = settings.frame ? CAP : Infinity;
-  post('open', {
-    url: new URL(source, document.baseURI).href, base64: document.getElementById(element.getAttribute('held'))?.textContent,
-    wish: { budget, error, level: settings.level, paused, memory: memory * 1e6, cap },
-  });
+  if (held) post('held', { base64: held });
   if (settings.wire) post('wire', { on: true });
   const ready = show();
   worker.onmessage = async ({ data }) => {
@@ -189,7 +192,7 @@ function begin(element) {
     settings[key] = typeof USUAL[key] === 'number' ? Math.max(Number.parseFloat(value) || 0, 0) : value;
     panel.setting(key, settings[key]);
     if (key === 'frame') {
-      cap = settings.frame ? CAP : Infinity;
+      cap = settings.frame ? CAP : LARGEST;
       frames = [];
       wish({ cap });
     } else if (key === 'wire') post('wire', { on: value });

@@ -14,9 +14,14 @@ import './columns.js';
 import './fan.js';
 import './positions.js';
 
-let stream;
+const { url, wish } = JSON.parse(name);
+let stream = url && begin(makeLine(url));
 let pictures;
 let wire;
+
+function begin(line) {
+  return makeStream(line, wish, show, (message) => postMessage(message));
+}
 
 /** Hand the buffers of a new level over. */
 function show(places, first) {
@@ -27,11 +32,10 @@ function show(places, first) {
 }
 
 const actions = {
-  open({ url, base64, wish }) {
-    const line = base64 ? makeHeld(Uint8Array.from(atob(base64), (letter) => letter.charCodeAt(0))) : makeLine(url);
-    stream = makeStream(line, wish, show, (message) => postMessage(message));
+  held({ base64 }) {
+    stream = begin(makeHeld(Uint8Array.from(atob(base64), (letter) => letter.charCodeAt(0))));
   },
-  wish: ({ wish }) => stream.want(wish),
+  wish: (message) => stream.want(message.wish),
   drawn: () => stream.drawn(),
   again: () => stream.again(),
   wire({ on }) {
