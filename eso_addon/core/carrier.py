@@ -17,6 +17,7 @@ from .edge_data import carried_edges
 from .lines import Lines
 from .mesh import Bools, Floats, Ints
 from .prepare import Prepared
+from .reinsertion import with_parts
 from .symmetry import Mirror, completed
 from .unflip import areas_of, mapped_by_source, turned_back
 
@@ -81,22 +82,32 @@ class Carrier:
         """Whether edges may flip: a UV map's triangles could turn over."""
         return not any(layer.kind == "uv" for layer in self._attributes.layers)
 
+    @property
+    def reinserts(self) -> bool:
+        """Whether vertices may come back: faces split where edges may flip, but not in one half of a mesh alone."""
+        return self.flips and self._mirror is None
+
     def sheets(self, face_map: Ints) -> Ints | None:
         """Return the connected part of the input that each face is in, None where the weld joined none."""
         return None if self._mesh.sheet is None else self._mesh.sheet.take(self._vertex[0].take(face_map))
 
     def bound(self, survivor: Ints, count: int) -> Bools:
         """Tell the level's vertices, (count,) bool, between which edges must not flip: they carry a line or a value."""
+        bound = np.zeros(count + 1, bool)
+        bound[survivor.compress(self.marked)] = True  # those that are gone write beyond the end
+        return bound[:-1]
+
+    @cached_property
+    def marked(self) -> Bools:
+        """The engine's vertices, (n,) bool, that are on lines, locked, or at an edge that carries a value."""
         marked = self._held.copy()
         for layer in self._own.on("edge"):
             ends = self._mesh.vertex.take(self._own.edges[(layer.rows != 0).any(axis=1)])
             marked[ends[ends >= 0]] = True
-        bound = np.zeros(count + 1, bool)
-        bound[survivor.compress(marked)] = True  # those that are gone write beyond the end
-        return bound[:-1]
+        return marked
 
     def carry(self, placed: Floats, corners: Ints, face_map: Ints, survivor: Ints,
-              slots: Ints | None = None) -> Carried:
+              slots: Ints | None = None, back: Ints | None = None) -> Carried:
         """Put everything on a level.
 
         Parameters
@@ -111,6 +122,8 @@ class Carrier:
             The level's vertex that each has become, -1 if it is gone.
         slots : ndarray, (f, 3) int64, optional
             Where edges have flipped: for each corner the one that it was before, as 3 * face + number.
+        back : ndarray, (c,) int64, optional
+            The engine's vertices that are the level's last ones, put back into faces of `face_map`.
         """
         survivor = np.where(survivor < 0, len(placed), survivor)
         if self._mirror is not None:
@@ -127,6 +140,11 @@ class Carrier:
         slot = (rows * self._lines.faces.shape[1] + face_map).T.ravel()
         if slots is not None:
             slot = slot.take(slots.ravel())
+            face_map = with_parts(face_map, slots)
+        if back is not None and len(back):
+            fresh = np.flatnonzero(corners.ravel() >= len(placed) - len(back))
+            own = back.take(corners.ravel().take(fresh) - (len(placed) - len(back)))
+            slot[fresh] = self._corner_of.take(own)
         target = places.target.ravel().take(slot)
         number, wedge_of, vertex_map = self._part(places, slot, target)
         vertex = self._lines.faces.ravel().take(slot)
@@ -141,6 +159,14 @@ class Carrier:
             return level
         images = self._values(self._mirror.of_half(self._attributes, mirrored=True), at)
         return completed(level, images, self._mirror, self._original, self._attributes)
+
+    @cached_property
+    def _corner_of(self) -> Ints:
+        """A corner of each of the engine's vertices, as a slot."""
+        corners = self._lines.faces.ravel()
+        corner_of = np.zeros(self._points.shape[1], np.int64)
+        corner_of[corners] = np.arange(len(corners))
+        return corner_of
 
     def _values(self, attributes: AttributeSet, at: _Level) -> dict[str, NDArray]:
         """Return the attributes of vertices, corners and faces on a level."""

@@ -12,7 +12,7 @@ from .mesh import Bools, Floats, Ints
 # above every collapse and every key
 NONE = np.iinfo(np.int64).max
 # faces a block: its arrays stay in the second cache
-BLOCK = 16384
+BLOCK = 65536
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ import numpy as np
 
 from .carrier import Carrier
 from .closest import ClosestPoints
-from .levels import Mesh, Probes, SimplifyResult, level
+from .levels import Mesh, Probes, SimplifyResult, level, spare_of
 from .mesh import Floats, Ints
 from .normals import face_areas
 from .options import Options
@@ -94,7 +94,8 @@ class _Search:
         """Return a level: finished, or without what takes time and moves it little."""
         if plain:
             return level(self.mesh, self.record, self.original, length, replace(self.options, refit=False))
-        return level(self.mesh, self.record, self.original, length, self.options, self.carrier)
+        spare = spare_of(self.record.left(length), self.options, self.carrier)
+        return level(self.mesh, self.record, self.original, length, self.options, self.carrier, spare)
 
     def first_guesses(self) -> Iterator[int]:
         """Yield where probes of unfinished levels point to, then lengths in wider and wider steps on both sides."""
@@ -106,8 +107,7 @@ class _Search:
             else:
                 low = middle
         yield low
-        left = int(self.record.faces_left[low - 1]) if low else self.record.faces_before
-        stride = max(int(_STRIDE * left / 2), 1)
+        stride = max(int(_STRIDE * self.record.left(low) / 2), 1)
         while stride < 2 * len(self.record):
             yield min(low + stride, len(self.record))
             yield max(low - stride, 0)

@@ -15,7 +15,8 @@ from .mesh import Floats, Ints
 from .options import Options
 from .prepare import Prepared
 from .record import CollapseRecord
-from .refit import refit
+from .refit import Refitted, refit
+from .reinsertion import spare_vertices, with_parts
 
 Int32s = NDArray[np.int32]
 Mesh = tuple[Floats, Ints]
@@ -35,7 +36,8 @@ class SimplifyResult:
     vertex_map : ndarray, (n,) int32
         The vertex that each input vertex has become, -1 if it is gone.
     face_map : ndarray, (m,) int32
-        The input face that each face comes from; of two whose edge has flipped, either.
+        The input face that each face comes from; of two whose edge has flipped, either; of one into which the refit
+        has put a vertex back, the same for all its parts.
     reached : bool
         Whether the target was reached.
     messages : tuple of str
@@ -76,8 +78,11 @@ def in_input_units(record: CollapseRecord, mesh: Prepared, vertices: Floats) -> 
 
 
 def level(mesh: Prepared, record: CollapseRecord, original: Mesh, length: int,
-           options: Options, carrier: Carrier | None = None) -> SimplifyResult:
-    """Build the mesh after so many collapses, refitted, in the input's numbers, with what the carrier puts on it."""
+           options: Options, carrier: Carrier | None = None, spare: int = 0) -> SimplifyResult:
+    """Build the mesh after so many collapses, refitted, in the input's numbers, with what the carrier puts on it.
+
+    The refit may put `spare` vertices back.
+    """
     vertices, faces = original
     points, corners, face_map, survivor = record.level(vertices[mesh.source], mesh.faces.T, length)
     if mesh.turned is not None:
@@ -90,29 +95,39 @@ def level(mesh: Prepared, record: CollapseRecord, original: Mesh, length: int,
     number[alive] = np.arange(len(alive))
     corners, placed = number.take(corners), points.take(alive, axis=0)
     merged = number.take(survivor)  # of the engine's vertices
-    vertex_map = np.where(mesh.vertex >= 0, merged.take(mesh.vertex, mode="clip"), -1)
-    slots = np.arange(corners.size).reshape(corners.shape)  # of the corners before edges flip
+    fitted = Refitted(placed, corners, np.arange(corners.size).reshape(corners.shape), np.zeros(0, np.int64))
     if options.refit and options.moves and length:
         # the engine's vertices stand for the input's, so that seams stay closed
-        placed, slots = refit(
+        fitted = refit(
             placed, corners, vertices[mesh.source], mesh.faces.T, vertex_map=merged,
             fixed=None if carrier is None else carrier.held(merged, len(placed)),
             bound=None if carrier is None else carrier.bound(merged, len(placed)),
             group=_sheets(mesh, faces, face_map) if carrier is None else carrier.sheets(face_map),
-            flips=options.flips and (carrier is None or carrier.flips))
-        corners = corners.ravel().take(slots)
+            flips=options.flips and (carrier is None or carrier.flips), spare=spare,
+            apart=None if carrier is None else carrier.marked)
+        merged[fitted.back] = len(placed) + np.arange(len(fitted.back))
+    placed, corners, slots = fitted.vertices, fitted.faces, fitted.corner
+    vertex_map = np.where(mesh.vertex >= 0, merged.take(mesh.vertex, mode="clip"), -1)
     if carrier is not None:
-        carried = carrier.carry(placed, corners, face_map, merged, slots)
+        carried = carrier.carry(placed, corners, face_map, merged, slots, fitted.back)
         messages = (*mesh.messages, *carrier.messages)
         return SimplifyResult(carried.points, carried.corners.astype(np.int32), carried.vertex_map.astype(np.int32),
                               carried.face_map.astype(np.int32), True, messages, record, original,
                               carried.attributes, carried.edges.astype(np.int32))
-    face_map = mesh.face[face_map]
+    before = mesh.face[face_map]
+    face_map = with_parts(before, slots)
     if mesh.sheet is not None:
-        before = faces[face_map].ravel().take(slots)
+        before = faces[before].ravel().take(slots)
         placed, corners, vertex_map = _split(mesh.sheet, before, placed, corners, vertex_map)
     return SimplifyResult(placed, corners.astype(np.int32), vertex_map.astype(np.int32), face_map.astype(np.int32),
                           True, mesh.messages, record, original)
+
+
+def spare_of(count: int, options: Options, carrier: Carrier | None) -> int:
+    """Return how many vertices a refit may put back into a level of so many triangles."""
+    if not (options.refit and options.moves and options.flips) or (carrier is not None and not carrier.reinserts):
+        return 0
+    return spare_vertices(count)
 
 
 def _sheets(mesh: Prepared, input_faces: Ints, face_map: Ints) -> Ints | None:

@@ -48,6 +48,10 @@ class CollapseRecord:
             return 0
         return min(int(np.searchsorted(-self.faces_left, -faces)) + 1, len(self))
 
+    def left(self, length: int) -> int:
+        """Return how many triangles so many collapses leave."""
+        return int(self.faces_left[length - 1]) if length else self.faces_before
+
     def survivors(self, vertex_count: int, length: int) -> Ints:
         """Return the vertex that each vertex has become after `length` collapses: (n,) int64."""
         parent = np.arange(vertex_count)

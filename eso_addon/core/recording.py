@@ -13,7 +13,7 @@ from .collapse import collapse_steps
 from .error_limit import within
 from .feature_collapse import guide_for
 from .guidance import guidance_of
-from .levels import Mesh, SimplifyResult, in_input_units, judge_count, level
+from .levels import Mesh, SimplifyResult, in_input_units, judge_count, level, spare_of
 from .options import Options
 from .prepare import Prepared, prepare
 from .record import CollapseRecord
@@ -68,14 +68,23 @@ class Recording:
         options = self.options if refit is None else replace(self.options, refit=refit)
         results: list[SimplifyResult] = []
         for count in counts:
-            result = level(self.mesh, self.record, self.original, self.record.length_for(count), options,
-                           self.carrier)
-            results.append(judge_count(result, count, options))
+            results.append(judge_count(self._level(count, options), count, options))
             yield len(results) / len(counts)
         for error in errors:
             results.append(within(self.mesh, self.record, self.original, error, options, self.carrier))
             yield len(results) / len(errors)
         return results
+
+
+    def _level(self, count: int, options: Options) -> SimplifyResult:
+        spare = spare_of(count, options, self.carrier)
+        length = self.record.length_for(count - 2 * spare)
+        spare = min(spare, max(count - self.record.left(length), 0) // 2)
+        result = level(self.mesh, self.record, self.original, length, options, self.carrier, spare)
+        if spare and len(result.faces) < count - 1:  # not as many as wanted could come back
+            length = self.record.length_for(count)
+            result = level(self.mesh, self.record, self.original, length, options, self.carrier)
+        return result
 
 
 def recording_steps(original: Mesh, options: Options, least: int) -> Generator[float, None, Recording]:
@@ -101,10 +110,13 @@ def recording_steps(original: Mesh, options: Options, least: int) -> Generator[f
         guide = guide_for(mesh, options, guidance.edges) if options.method == "feature" else None
         quadrics = initial_quadrics(mesh, options, blocks, guidance)
         yield 0.12
-        run = collapse_steps(mesh.points, mesh.faces, quadrics, mesh.opened, guidance.locked, least, options.rules,
+        # further than asked: a refit puts vertices back
+        spare = spare_of(least, options, guidance.carrier)
+        last = max(least - 2 * (spare + 1), 0) if spare else least
+        run = collapse_steps(mesh.points, mesh.faces, quadrics, mesh.opened, guidance.locked, last, options.rules,
                              blocks, guide)
-        total = max(mesh.faces.shape[1] - least, 1)
-        record = yield from scaled(run, lambda left: 0.12 + 0.88 * (1 - (left - least) / total))
+        total = max(mesh.faces.shape[1] - last, 1)
+        record = yield from scaled(run, lambda left: 0.12 + 0.88 * (1 - (left - last) / total))
     finally:
         blocks.close()
     record = in_input_units(record, mesh, vertices)

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,8 +11,10 @@ from numpy.typing import NDArray
 from .adjacency import boundary_vertices, sorting_order, stars
 from .closest import ClosestPoints, closest_in_triangles, squared_distances, triangle_frames
 from .flips import flip_edges
+from .least_squares import Samples, best_step
 from .mesh import bounds
 from .normals import face_area_vectors, face_areas, face_normals, lengths
+from .reinsertion import reinsert
 
 Bools = NDArray[np.bool_]
 Floats = NDArray[Any]  # float64, or float32 where only a choice hangs on it
@@ -22,16 +23,33 @@ Ints = NDArray[np.int64]
 _ROUNDS = 3
 _PER_FACE = 10
 _LEAST = 5000  # and at least so many in all: they are soon done, and miss nothing of a small mesh
-_DAMPING = 0.2  # pull towards the present position, relative to what evenly spread samples weigh
-_TILT = 0.03  # weight of a tilt against the original's normal, times an edge, beside that of a distance
-_AGREE = 0.5  # least cosine between a sample's normal and its face's for the tilt to count
-_STEPS = 4  # of conjugate gradients: each round starts near the answer, more change nothing
 _TURN = 0.5  # least cosine between a face's normals before and after
 _SHAPE = 0.5  # least area over squared edges afterwards, relative to before
 _HALVINGS = 3
 _SINGLE = 1e-5  # rounding of squared distances in single precision
 _FAR = 9.0  # times the median squared distance
-_BLOCK = 2048
+_BLOCK = 8192
+
+
+class Refitted(NamedTuple):
+    """A mesh fitted to its original.
+
+    Attributes
+    ----------
+    vertices : (k + c, 3) float64
+        The new positions, those of vertices that came back last; fixed vertices have theirs bit for bit.
+    faces : (m + 2 c, 3) int64
+    corner : (m + 2 c, 3) int64
+        The corner of the given faces that each one was, as 3 * face + number; of a vertex that came back one of a
+        face that it lies on.
+    back : (c,) int64
+        The original vertices that came back.
+    """
+
+    vertices: Floats
+    faces: Ints
+    corner: Ints
+    back: Ints
 
 
 def refit(
@@ -46,13 +64,15 @@ def refit(
     group: Ints | None = None,
     rounds: int = _ROUNDS,
     flips: bool = True,
-) -> tuple[Floats, Ints]:
+    spare: int = 0,
+    apart: Bools | None = None,
+) -> Refitted:
     """Fit a simplified mesh to its original by moving its vertices and flipping its edges.
 
-    Each round finds the closest point on the simplified surface for samples of the original, then solves a damped
-    least squares for the positions with those correspondences held (Hoppe et al. 1993, Mesh optimization, section 4.1).
-    Between two rounds, edges flip where that brings the surface nearer. No face turns over or into a sliver, and the
-    largest distance of a sample does not rise.
+    First the original vertices that are farthest from it come back, if any may. Each round finds the closest point on
+    the simplified surface for samples of the original, then solves a damped least squares for the positions with those
+    correspondences held (Hoppe et al. 1993, Mesh optimization, section 4.1). Between two rounds, edges flip where that
+    brings the surface nearer. No face turns over or into a sliver, and the largest distance of a sample does not rise.
 
     Parameters
     ----------
@@ -69,59 +89,53 @@ def refit(
     rounds : int
     flips : bool
         Without them the triangles stay what they are.
-
-    Returns
-    -------
-    vertices : (k, 3) float64
-        The new positions; fixed vertices have theirs bit for bit.
-    corner : (m, 3) int64
-        For each corner of the new faces the corner of the given ones that it was, as 3 * face + number.
+    spare : int
+        Original vertices that may come back; each makes two more triangles.
+    apart : (n,) bool, optional
+        Original vertices that must not.
     """
     held = boundary_vertices(faces, len(vertices))
     if fixed is not None:
         held |= fixed
     flat = not face_area_vectors(original_vertices, original_faces).any()
     if len(faces) == 0 or rounds < 1 or flat or (held.all() and not flips):
-        return vertices.copy(), np.arange(faces.size).reshape(faces.shape)
-    fit, center, size = _begun(vertices, faces, original_vertices, original_faces, vertex_map, held)
+        return Refitted(vertices.copy(), faces, np.arange(faces.size).reshape(faces.shape), np.zeros(0, np.int64))
+    fit, near, center, size = _begun(vertices, faces, original_vertices, original_faces, vertex_map, held)
+    fit.bound, fit.group = bound, group
+    back = near[:0]
+    if spare:
+        back = fit.reinsert(near, spare, apart)
+        vertices = np.concatenate((vertices, original_vertices.take(back, axis=0)))
     start = fit.vertices
     for done in range(rounds):
         fit.move()
         if flips and done < rounds - 1:
-            fit.flip(bound, group)
+            fit.flip()
     moved = fit.vertices
-    return np.where((moved == start).all(axis=1)[:, None], vertices, moved * size + center), fit.corner
+    placed = np.where((moved == start).all(axis=1)[:, None], vertices, moved * size + center)
+    return Refitted(placed, fit.faces, fit.corner, back)
 
 
 def _begun(vertices: Floats, faces: Ints, original_vertices: Floats, original_faces: Ints, vertex_map: Ints | None,
-           held: Bools) -> tuple[_Fit, Floats, float]:
-    """Return what is fitted, in a frame of its own: about this centre, and of this size."""
+           held: Bools) -> tuple[_Fit, Ints, Floats, float]:
+    """Return what is fitted, in a frame of its own, its samples that are vertices, and the frame's centre and size."""
     # unit size and the origin in the middle keep the precision of small parts of large scenes
     low, high = bounds(vertices)
     center, size = (low + high) / 2, float((high - low).max()) or 1.0
-    samples, weights, near, normals = _samples(original_vertices, original_faces, max(_PER_FACE * len(faces), _LEAST))
+    wanted = max(_PER_FACE * len(faces), _LEAST)
+    samples, weights, near, normals, count = _samples(original_vertices, original_faces, wanted)
     # single precision decides which face is near: it takes half the time, and positions are solved in double
     exact = np.ascontiguousarray(((samples - center) / size).T)
     points = exact.astype(np.float32)
     start = (vertices - center) / size
     face = _first_faces(start, faces, points, None if vertex_map is None else vertex_map.take(near))
-    return _Fit(start, faces, _Samples(exact, points, weights, normals), face, held), center, size
+    return _Fit(start, faces, Samples(exact, points, weights, normals), face, held), near[:count], center, size
 
 
-class _Samples(NamedTuple):
-    """Samples of the original: (3, k) points in double and single precision, (k,) weights, (3, k) normals.
+def _samples(vertices: Floats, faces: Ints, wanted: int) -> tuple[Floats, Floats, Ints, Floats, int]:
+    """Return vertices and face centres, about `wanted` where there are more: points, weights, vertices near, normals.
 
-    The normals of vertices are zero: at a sharp edge they are no face's.
-    """
-
-    exact: Floats
-    points: Floats
-    weights: Floats
-    normals: Floats
-
-
-def _samples(vertices: Floats, faces: Ints, wanted: int) -> tuple[Floats, Floats, Ints, Floats]:
-    """Return vertices and face centres, about `wanted` where there are more, weights, a vertex near each, and normals.
+    The last number tells how many of them are vertices, which come first.
 
     Vertices hold the features, centres the area between: together they integrate squares over a triangle exactly.
     """
@@ -137,7 +151,8 @@ def _samples(vertices: Floats, faces: Ints, wanted: int) -> tuple[Floats, Floats
     weights = np.concatenate([star[pick] / 12, areas[middle] * 0.75])
     normals = np.concatenate([np.zeros((len(pick), 3)), face_normals(vertices, corners)])
     points = np.concatenate([vertices[pick], centers])
-    return points, weights / weights.mean(), np.concatenate([pick, corners[:, 0]]), np.ascontiguousarray(normals.T)
+    return (points, weights / weights.mean(), np.concatenate([pick, corners[:, 0]]), np.ascontiguousarray(normals.T),
+            len(pick))
 
 
 def _evenly(count: int, share: float) -> Ints:
@@ -149,34 +164,44 @@ def _evenly(count: int, share: float) -> Ints:
 class _Fit:
     """A simplified mesh on its way to its samples, each with its nearest face."""
 
-    def __init__(self, vertices: Floats, faces: Ints, samples: _Samples, face: Ints, held: Bools) -> None:
+    def __init__(self, vertices: Floats, faces: Ints, samples: Samples, face: Ints, held: Bools) -> None:
         self.vertices, self.faces = vertices, faces
         self.corner = np.arange(faces.size).reshape(faces.shape)
         self.samples, self.face, self.held = samples, face, held
+        self.bound: Bools | None = None
+        self.group: Ints | None = None
         self.start = vertices  # since the last flips: what faces turn against
         self.neighbors = _face_neighbors(faces, len(vertices))
-        self._look(vertices)
+        self.squared, self.closest = np.empty(len(face)), np.empty_like(samples.points)
+        self._look()
         # a guess goes wrong over long triangles and sharp edges: samples that seem far away are looked up exactly
         far = np.flatnonzero(self.squared > _FAR * np.median(self.squared))
         found = ClosestPoints(vertices, faces).query(samples.points.take(far, axis=1).T, hint=self.face[far])[1]
         self.face[far] = found
-        self._look(vertices)
+        self._look(far)
         self.worst = float(self.squared.max())
 
-    def _look(self, vertices: Floats) -> None:
-        """Follow the samples' nearest faces to where the vertices now are."""
-        self.face, self.squared, self.closest = _correspond(vertices, self.faces, self.samples.points, self.face,
-                                                            self.neighbors)
+    def _look(self, which: Ints | None = None) -> None:
+        """Follow the samples' nearest faces, or those of some samples, to where the vertices now are."""
+        some = slice(None) if which is None else which
+        found = _correspond(self.vertices, self.faces, self.samples.points[:, some], self.face[some], self.neighbors)
+        self.face[some], self.squared[some], self.closest[:, some] = found
+
+    def _beside(self, changed: Bools) -> Ints:
+        """Return the samples whose nearest face, or one across its sides, has changed."""
+        near = changed | changed.take(self.neighbors).any(axis=0)
+        return np.flatnonzero(near.take(self.face))
 
     def move(self) -> None:
         """Move the vertices to where the samples pull them, but none that makes the worst sample worse."""
         now, faces = self.vertices, self.faces
-        step = _solve(now, faces, self.samples, self.face, _barycentric(now, faces, self.face, self.closest))
+        step = best_step(now, faces, self.samples, self.face, _barycentric(now, faces, self.face, self.closest))
         step[self.held] = 0
         share = np.ones(len(now))
         for _ in range(2 * _HALVINGS):
-            self.vertices = _without_flips(now, share[:, None] * step, faces, self.start)
-            self._look(self.vertices)
+            before, self.vertices = self.vertices, _without_flips(now, share[:, None] * step, faces, self.start)
+            moved = (self.vertices != before).any(axis=1)
+            self._look(self._beside(moved.take(faces).any(axis=1)))
             bad = self.squared > self.worst * (1 + _SINGLE)
             if not bad.any():
                 break
@@ -184,20 +209,52 @@ class _Fit:
             share[back] = np.where(share[back] > 0.5**_HALVINGS, share[back] / 2, 0)
         else:
             self.vertices = now
-            self._look(now)
+            self._look()
         self.worst = min(self.worst, float(self.squared.max()))
 
-    def flip(self, bound: Bools | None, group: Ints | None) -> None:
+    def reinsert(self, near: Ints, wanted: int, apart: Bools | None) -> Ints:
+        """Make vertices of the farthest samples that are the original's vertices `near`; return which these were."""
+        count = len(near)
+        squared = self.squared[:count] if apart is None else np.where(apart.take(near), 0, self.squared[:count])
+        weights = _barycentric(self.vertices, self.faces, self.face[:count], self.closest[:, :count])
+        made = reinsert(self.vertices, self.faces, self.neighbors, self.samples.exact[:, :count], squared,
+                        self.face[:count], weights, wanted, self._free_sides())
+        self.vertices = np.concatenate((self.vertices, self.samples.exact[:, made.chosen].T))
+        self.held = np.concatenate((self.held, np.zeros(len(made.chosen), bool)))
+        if self.bound is not None:
+            self.bound = np.concatenate((self.bound, np.zeros(len(made.chosen), bool)))
+        if self.group is not None:
+            self.group = self.group.take(made.corner[:, 0] // 3)
+        self._changed(made.faces, made.corner, made.changed)
+        self.worst = float(self.squared.max())
+        return near.take(made.chosen)
+
+    def _free_sides(self) -> Bools:
+        """Tell the sides, (3, m), that no line runs along."""
+        free = np.ones(self.neighbors.shape, bool)
+        ends = self.faces.T
+        if self.bound is not None:
+            bound = self.bound.take(ends)
+            free &= ~(bound & np.roll(bound, -1, axis=0))
+        if self.group is not None:
+            free &= self.group.take(self.neighbors) == self.group
+        return free
+
+    def _changed(self, faces: Ints, corner: Ints, changed: Bools) -> None:
+        """Take other faces, whose corners these were, and look again at the samples of those that changed."""
+        self.faces, self.corner = faces, self.corner.ravel().take(corner)
+        self.start = self.vertices
+        self.neighbors = _face_neighbors(faces, len(self.vertices))
+        self._look(self._beside(changed))
+
+    def flip(self) -> None:
         """Flip edges where that brings the samples nearer."""
         points, weights, normals = self.samples.points, self.samples.weights, self.samples.normals
         corner, self.face = flip_edges(self.vertices, self.faces, points, normals, weights, self.face, self.squared,
-                                       bound=bound, group=group)
-        if np.array_equal(corner.ravel(), np.arange(corner.size)):
-            return
-        self.faces, self.corner = self.faces.ravel().take(corner), self.corner.ravel().take(corner)
-        self.start = self.vertices
-        self.neighbors = _face_neighbors(self.faces, len(self.vertices))
-        self._look(self.vertices)
+                                       bound=self.bound, group=self.group)
+        changed = (corner != np.arange(corner.size).reshape(-1, 3)).any(axis=1)
+        if changed.any():
+            self._changed(self.faces.ravel().take(corner), corner, changed)
 
 
 def _first_faces(vertices: Floats, faces: Ints, points: Floats, survivor: Ints | None) -> Ints:
@@ -282,101 +339,6 @@ def _barycentric(vertices: Floats, faces: Ints, face: Ints, points: Floats) -> F
         third = (offset * local[6:]).sum(axis=0).clip(0, 1 - second)
         weights[:, part] = 1 - second - third, second, third
     return weights
-
-
-def _solve(vertices: Floats, faces: Ints, samples: _Samples, face: Ints, places: Floats) -> Floats:
-    """Return the (k, 3) step that brings the points at `places` of their faces near to the samples, level with them.
-
-    The normal equations are kept as one symmetric 3 by 3 block a face for the distances, and one for the tilts.
-    """
-    count, columns = len(faces), np.ascontiguousarray(vertices.T)
-    weights = samples.weights
-    residual = samples.exact.copy()
-    for corner in range(3):
-        residual -= places[corner] * columns.take(faces[:, corner].take(face), axis=1)
-    heavy = weights * places
-    blocks = {(i, j): _sums(face, heavy[i] * places[j], count) for i in range(3) for j in range(i, 3)}
-    corners = np.ascontiguousarray(faces.T)
-    pull = np.stack(
-        [_gather([_sums(face, heavy[i] * row, count) for i in range(3)], corners, len(vertices)) for row in residual]
-    )
-    # evenly spread samples would put a sixth of a face's weight on the diagonal of each of its corners
-    share = lengths(face_area_vectors(vertices, faces))
-    share *= weights.sum() / (6 * max(float(share.sum()), 1e-300))
-    damping = _DAMPING * _gather([share] * 3, corners, len(vertices)) + 1e-9
-    diagonal = damping + _gather([blocks[i, i] for i in range(3)], corners, len(vertices))
-    tilts = _tilts(vertices, faces, samples, face)
-    pull -= _tilt(tilts, columns, corners)
-    diagonal = diagonal + np.stack([_gather([2 * tilts[axis, axis]] * 3, corners, len(vertices)) for axis in range(3)])
-
-    def apply(step: Floats) -> Floats:
-        out = damping * step + _tilt(tilts, step, corners)
-        for axis in range(3):
-            x, y, z = step[axis].take(corners)
-            out[axis] += _gather(
-                [
-                    blocks[0, 0] * x + blocks[0, 1] * y + blocks[0, 2] * z,
-                    blocks[0, 1] * x + blocks[1, 1] * y + blocks[1, 2] * z,
-                    blocks[0, 2] * x + blocks[1, 2] * y + blocks[2, 2] * z,
-                ],
-                corners,
-                len(vertices),
-            )
-        return out
-
-    return _conjugate_gradients(apply, pull, diagonal).T
-
-
-def _tilts(vertices: Floats, faces: Ints, samples: _Samples, face: Ints) -> Floats:
-    """Return (3, 3, m): outer products of the normals of each face's samples, where they agree with it, summed."""
-    normals = samples.normals
-    own = np.ascontiguousarray(face_normals(vertices, faces).T)
-    weights = np.where((own.take(face, axis=1) * normals).sum(axis=0) > _AGREE, _TILT * samples.weights, 0)
-    sums = np.empty((3, 3, len(faces)))
-    for i in range(3):
-        for j in range(i, 3):
-            sums[i, j] = sums[j, i] = _sums(face, weights * normals[i] * normals[j], len(faces))
-    return sums
-
-
-def _tilt(tilts: Floats, columns: Floats, corners: Ints) -> Floats:
-    """Return the gradient, (3, k), of how far the faces' edges rise along the samples' normals, squared and halved."""
-    ends = [columns.take(corner, axis=1) for corner in corners]
-    rises = [np.einsum("ijf,jf->if", tilts, ends[(corner + 1) % 3] - ends[corner]) for corner in range(3)]
-    return np.stack(
-        [
-            _gather([rises[corner - 1][axis] - rises[corner][axis] for corner in range(3)], corners, columns.shape[1])
-            for axis in range(3)
-        ]
-    )
-
-
-def _gather(values: list[Floats], corners: Ints, count: int) -> Floats:
-    """Return the sums over the faces around each vertex of values at the faces' corners."""
-    return _sums(corners.ravel(), np.concatenate(values), count)
-
-
-def _sums(index: Ints, values: Floats, count: int) -> Floats:
-    """Return the sums of the values at each index."""
-    return np.bincount(index, values, minlength=count).astype(np.float64, copy=False)
-
-
-def _conjugate_gradients(apply: Callable[[Floats], Floats], right: Floats, diagonal: Floats) -> Floats:
-    """Return about the solution of a positive definite system, three right sides at once, from zero on."""
-    answer, rest = np.zeros_like(right), right.copy()
-    scaled = rest / diagonal
-    direction = scaled.copy()
-    old = (rest * scaled).sum(axis=1, keepdims=True)
-    for _ in range(_STEPS):
-        image = apply(direction)
-        length = old / np.maximum((direction * image).sum(axis=1, keepdims=True), 1e-300)
-        answer += length * direction
-        rest -= length * image
-        scaled = rest / diagonal
-        new = (rest * scaled).sum(axis=1, keepdims=True)
-        direction = scaled + new / np.maximum(old, 1e-300) * direction
-        old = new
-    return answer
 
 
 def _without_flips(vertices: Floats, step: Floats, faces: Ints, start: Floats) -> Floats:

@@ -56,7 +56,7 @@ def test_no_face_flips_held_vertices_stay_and_samples_do_not_get_farther(case: C
     vertices, faces, original, original_faces, guided = case
     fixed = np.arange(len(vertices)) % 5 == 0
     near = nearest_vertex(vertices, original) if guided else None
-    moved, corner = refit(vertices, faces, original, original_faces, vertex_map=near, fixed=fixed, flips=False)
+    moved, _, corner, _ = refit(vertices, faces, original, original_faces, vertex_map=near, fixed=fixed, flips=False)
     before, after = face_area_vectors(vertices, faces), face_area_vectors(moved, faces)
     assert ((before * after).sum(axis=1) > 0).all()
     assert np.array_equal(corner.ravel(), np.arange(faces.size))
@@ -65,7 +65,7 @@ def test_no_face_flips_held_vertices_stay_and_samples_do_not_get_farther(case: C
     assert np.isfinite(moved).all()
     was = ClosestPoints(vertices, faces).query(original)[2].max()
     assert ClosestPoints(moved, faces).query(original)[2].max() <= was * 1.21 + 1e-12  # not every vertex is a sample
-    again, _ = refit(vertices, faces, original, original_faces, vertex_map=near, fixed=fixed, flips=False)
+    again, *_ = refit(vertices, faces, original, original_faces, vertex_map=near, fixed=fixed, flips=False)
     assert np.array_equal(again, moved)
 
 
@@ -74,7 +74,7 @@ def test_the_mean_falls_on_a_curved_sheet(guided: bool) -> None:
     original, original_faces = height_field(60, waves)
     vertices, faces = height_field(12, waves, noise=1.0)
     near = nearest_vertex(vertices, original) if guided else None
-    moved, _ = refit(vertices, faces, original, original_faces, vertex_map=near)
+    moved, *_ = refit(vertices, faces, original, original_faces, vertex_map=near)
     before = measure(original, original_faces, vertices, faces, samples=20000).symmetric
     after = measure(original, original_faces, moved, faces, samples=20000).symmetric
     assert after.mean < 0.85 * before.mean
@@ -84,16 +84,16 @@ def test_the_mean_falls_on_a_curved_sheet(guided: bool) -> None:
 def test_a_plane_stays_a_plane() -> None:
     original, original_faces = height_field(40, lambda u, v: 0.5 * u + 0.25 * v)
     vertices, faces = height_field(8, lambda u, v: 0.5 * u + 0.25 * v, noise=1.0)
-    moved, _ = refit(vertices, faces, original, original_faces)
+    moved, *_ = refit(vertices, faces, original, original_faces)
     assert np.abs(moved[:, 2] - 0.5 * moved[:, 0] - 0.25 * moved[:, 1]).max() < 1e-6
 
 
 def test_size_and_place_do_not_matter() -> None:
     original, original_faces = height_field(40, waves)
     vertices, faces = height_field(8, waves, noise=1.0)
-    moved, _ = refit(vertices, faces, original, original_faces)
+    moved, *_ = refit(vertices, faces, original, original_faces)
     for scale, shift in ((1e-9, 0.0), (1e9, 0.0), (1.0, 1000.0)):
-        other, _ = refit(vertices * scale + shift, faces, original * scale + shift, original_faces)
+        other, *_ = refit(vertices * scale + shift, faces, original * scale + shift, original_faces)
         np.testing.assert_allclose((other - shift) / scale, moved, atol=1e-5)
 
 

@@ -60,8 +60,8 @@ def assert_valid(vertices: Floats, faces: Ints, result: SimplifyResult, *, flips
     assert (np.diff(np.sort(result.faces, axis=1), axis=1) > 0).all(), "a face with two equal corners"
     assert_array_equal(np.unique(result.faces), np.arange(len(result.vertices)), "vertices that no face uses")
     assert len(result.face_map) == len(result.faces)
-    assert len(np.unique(result.face_map)) == len(result.faces)
     if not flips:
+        assert len(np.unique(result.face_map)) == len(result.faces)
         assert_array_equal(result.vertex_map[faces[result.face_map]], result.faces)
     assert np.isin(result.faces, result.vertex_map).all()
     assert len(result.vertex_map) == len(vertices)

@@ -1,0 +1,127 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The least squares of a refit: where vertices go so that given places of their faces come near to samples."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .normals import face_area_vectors, face_normals, lengths
+
+Floats = NDArray[Any]  # float64, or float32 where only a choice hangs on it
+Ints = NDArray[np.int64]
+
+_DAMPING = 0.2  # pull towards the present position, relative to what evenly spread samples weigh
+_TILT = 0.03  # weight of a tilt against the original's normal, times an edge, beside that of a distance
+_AGREE = 0.5  # least cosine between a sample's normal and its face's for the tilt to count
+_STEPS = 4  # of conjugate gradients: each round starts near the answer, more change nothing
+
+
+class Samples(NamedTuple):
+    """Samples of the original: (3, k) points in double and single precision, (k,) weights, (3, k) normals.
+
+    The normals of vertices are zero: at a sharp edge they are no face's.
+    """
+
+    exact: Floats
+    points: Floats
+    weights: Floats
+    normals: Floats
+
+
+def best_step(vertices: Floats, faces: Ints, samples: Samples, face: Ints, places: Floats) -> Floats:
+    """Return the (k, 3) step that brings the points at `places` of their faces near to the samples, level with them.
+
+    The normal equations are kept as one symmetric 3 by 3 block a face for the distances, and one for the tilts.
+    """
+    count, columns = len(faces), np.ascontiguousarray(vertices.T)
+    weights = samples.weights
+    residual = samples.exact.copy()
+    for corner in range(3):
+        residual -= places[corner] * columns.take(faces[:, corner].take(face), axis=1)
+    heavy = weights * places
+    blocks = {(i, j): _sums(face, heavy[i] * places[j], count) for i in range(3) for j in range(i, 3)}
+    corners = np.ascontiguousarray(faces.T)
+    pull = np.stack(
+        [_gather([_sums(face, heavy[i] * row, count) for i in range(3)], corners, len(vertices)) for row in residual]
+    )
+    # evenly spread samples would put a sixth of a face's weight on the diagonal of each of its corners
+    share = lengths(face_area_vectors(vertices, faces))
+    share *= weights.sum() / (6 * max(float(share.sum()), 1e-300))
+    damping = _DAMPING * _gather([share] * 3, corners, len(vertices)) + 1e-9
+    diagonal = damping + _gather([blocks[i, i] for i in range(3)], corners, len(vertices))
+    tilts = _tilts(vertices, faces, samples, face)
+    pull -= _tilt(tilts, columns, corners)
+    diagonal = diagonal + np.stack([_gather([2 * tilts[axis, axis]] * 3, corners, len(vertices)) for axis in range(3)])
+
+    def apply(step: Floats) -> Floats:
+        out = damping * step + _tilt(tilts, step, corners)
+        for axis in range(3):
+            x, y, z = step[axis].take(corners)
+            out[axis] += _gather(
+                [
+                    blocks[0, 0] * x + blocks[0, 1] * y + blocks[0, 2] * z,
+                    blocks[0, 1] * x + blocks[1, 1] * y + blocks[1, 2] * z,
+                    blocks[0, 2] * x + blocks[1, 2] * y + blocks[2, 2] * z,
+                ],
+                corners,
+                len(vertices),
+            )
+        return out
+
+    return _conjugate_gradients(apply, pull, diagonal).T
+
+
+def _tilts(vertices: Floats, faces: Ints, samples: Samples, face: Ints) -> Floats:
+    """Return (3, 3, m): outer products of the normals of each face's samples, where they agree with it, summed."""
+    normals = samples.normals
+    own = np.ascontiguousarray(face_normals(vertices, faces).T)
+    weights = np.where((own.take(face, axis=1) * normals).sum(axis=0) > _AGREE, _TILT * samples.weights, 0)
+    sums = np.empty((3, 3, len(faces)))
+    for i in range(3):
+        for j in range(i, 3):
+            sums[i, j] = sums[j, i] = _sums(face, weights * normals[i] * normals[j], len(faces))
+    return sums
+
+
+def _tilt(tilts: Floats, columns: Floats, corners: Ints) -> Floats:
+    """Return the gradient, (3, k), of how far the faces' edges rise along the samples' normals, squared and halved."""
+    ends = [columns.take(corner, axis=1) for corner in corners]
+    rises = [np.einsum("ijf,jf->if", tilts, ends[(corner + 1) % 3] - ends[corner]) for corner in range(3)]
+    return np.stack(
+        [
+            _gather([rises[corner - 1][axis] - rises[corner][axis] for corner in range(3)], corners, columns.shape[1])
+            for axis in range(3)
+        ]
+    )
+
+
+def _gather(values: list[Floats], corners: Ints, count: int) -> Floats:
+    """Return the sums over the faces around each vertex of values at the faces' corners."""
+    return _sums(corners.ravel(), np.concatenate(values), count)
+
+
+def _sums(index: Ints, values: Floats, count: int) -> Floats:
+    """Return the sums of the values at each index."""
+    return np.bincount(index, values, minlength=count).astype(np.float64, copy=False)
+
+
+def _conjugate_gradients(apply: Callable[[Floats], Floats], right: Floats, diagonal: Floats) -> Floats:
+    """Return about the solution of a positive definite system, three right sides at once, from zero on."""
+    answer, rest = np.zeros_like(right), right.copy()
+    scaled = rest / diagonal
+    direction = scaled.copy()
+    old = (rest * scaled).sum(axis=1, keepdims=True)
+    for _ in range(_STEPS):
+        image = apply(direction)
+        length = old / np.maximum((direction * image).sum(axis=1, keepdims=True), 1e-300)
+        answer += length * direction
+        rest -= length * image
+        scaled = rest / diagonal
+        new = (rest * scaled).sum(axis=1, keepdims=True)
+        direction = scaled + new / np.maximum(old, 1e-300) * direction
+        old = new
+    return answer
