@@ -99,8 +99,8 @@ class Carrier:
 
     @cached_property
     def marked(self) -> Bools:
-        """The engine's vertices, (n,) bool, that are on lines, locked, or at an edge that carries a value."""
-        marked = self._held.copy()
+        """The engine's vertices, (n,) bool, on lines, at boundaries, locked, or at an edge that carries a value."""
+        marked = self._held | self._lines.parted
         for layer in self._own.on("edge"):
             ends = self._mesh.vertex.take(self._own.edges[(layer.rows != 0).any(axis=1)])
             marked[ends[ends >= 0]] = True
@@ -119,7 +119,7 @@ class Carrier:
         face_map : ndarray, (f,) int64
             The engine's face of each.
         survivor : ndarray, (engine's vertices,) int64
-            The level's vertex that each has become, -1 if it is gone.
+            The level's vertex that each had become before any came back, -1 if it is gone.
         slots : ndarray, (f, 3) int64, optional
             Where edges have flipped: for each corner the one that it was before, as 3 * face + number.
         back : ndarray, (c,) int64, optional
@@ -141,11 +141,13 @@ class Carrier:
         if slots is not None:
             slot = slot.take(slots.ravel())
             face_map = with_parts(face_map, slots)
+        target = places.target.ravel().take(slot)
         if back is not None and len(back):
             fresh = np.flatnonzero(corners.ravel() >= len(placed) - len(back))
-            own = back.take(corners.ravel().take(fresh) - (len(placed) - len(back)))
-            slot[fresh] = self._corner_of.take(own)
-        target = places.target.ravel().take(slot)
+            number = corners.ravel().take(fresh) - (len(placed) - len(back))
+            own = self._corner_of.take(back)
+            slot[fresh], target[fresh] = own.take(number), len(places.vertex) + number
+            places = self._with(places, own, len(placed))
         number, wedge_of, vertex_map = self._part(places, slot, target)
         vertex = self._lines.faces.ravel().take(slot)
         unmoved = (self._points == there.take(survivor, axis=1)).all(axis=0).take(vertex)
@@ -159,6 +161,16 @@ class Carrier:
             return level
         images = self._values(self._mirror.of_half(self._attributes, mirrored=True), at)
         return completed(level, images, self._mirror, self._original, self._attributes)
+
+    def _with(self, places: Places, own: Ints, count: int) -> Places:
+        """Add wedges of vertices that came back, the last of `count`, at these corners of their own."""
+        corner, face = np.divmod(own, self._lines.faces.shape[1])
+        weights = (np.arange(3)[:, None] == corner).astype(np.float64)
+        number = places.number.copy()
+        number[self._lines.wedge.ravel().take(own)] = len(places.vertex) + np.arange(len(own))
+        return Places(number, places.target, np.concatenate((places.face, face)),
+                      np.concatenate((places.weights, weights), axis=1),
+                      np.concatenate((places.vertex, np.arange(count - len(own), count))))
 
     @cached_property
     def _corner_of(self) -> Ints:

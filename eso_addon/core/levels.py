@@ -105,9 +105,10 @@ def level(mesh: Prepared, record: CollapseRecord, original: Mesh, length: int,
             group=_sheets(mesh, faces, face_map) if carrier is None else carrier.sheets(face_map),
             flips=options.flips and (carrier is None or carrier.flips), spare=spare,
             apart=None if carrier is None else carrier.marked)
-        merged[fitted.back] = len(placed) + np.arange(len(fitted.back))
+    numbers = merged.copy()
+    numbers[fitted.back] = len(placed) + np.arange(len(fitted.back))
     placed, corners, slots = fitted.vertices, fitted.faces, fitted.corner
-    vertex_map = np.where(mesh.vertex >= 0, merged.take(mesh.vertex, mode="clip"), -1)
+    vertex_map = np.where(mesh.vertex >= 0, numbers.take(mesh.vertex, mode="clip"), -1)
     if carrier is not None:
         carried = carrier.carry(placed, corners, face_map, merged, slots, fitted.back)
         messages = (*mesh.messages, *carrier.messages)

@@ -77,7 +77,7 @@ class Recording:
 
 
     def _level(self, count: int, options: Options) -> SimplifyResult:
-        spare = spare_of(count, options, self.carrier)
+        spare = spare_of(count, options, self.carrier) if count < self.record.faces_before else 0
         length = self.record.length_for(count - 2 * spare)
         spare = min(spare, max(count - self.record.left(length), 0) // 2)
         result = level(self.mesh, self.record, self.original, length, options, self.carrier, spare)

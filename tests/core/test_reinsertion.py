@@ -91,3 +91,14 @@ def test_chains_have_the_counts_that_were_asked() -> None:
     for level, target in zip(lod_chain(vertices, faces, faces_targets=targets), targets, strict=True):
         assert len(level.faces) in (target, target - 1)
         assert spare_vertices(target) == target // 200
+
+
+@QUICK
+@given(SEEDS)
+def test_what_is_carried_changes_no_face(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    vertices, faces = shapes.holed(shapes.noisy(shapes.torus(24, 32), rng, 0.03), rng, 0.05)
+    plain = simplify(vertices, faces, ratio=0.4)
+    result = simplify(vertices, faces, ratio=0.4, attributes={"weight": Attribute(rng.random(len(vertices)), "vertex")})
+    for name in ("vertices", "faces", "vertex_map", "face_map"):
+        assert_array_equal(getattr(result, name), getattr(plain, name), name)
