@@ -99,8 +99,8 @@ class Carrier:
 
     @cached_property
     def marked(self) -> Bools:
-        """The engine's vertices, (n,) bool, on lines, at boundaries, locked, or at an edge that carries a value."""
-        marked = self._held | self._lines.parted
+        """The engine's vertices, (n,) bool, on lines, locked, or at an edge that carries a value."""
+        marked = self._held.copy()
         for layer in self._own.on("edge"):
             ends = self._mesh.vertex.take(self._own.edges[(layer.rows != 0).any(axis=1)])
             marked[ends[ends >= 0]] = True

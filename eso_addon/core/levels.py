@@ -104,7 +104,7 @@ def level(mesh: Prepared, record: CollapseRecord, original: Mesh, length: int,
             bound=None if carrier is None else carrier.bound(merged, len(placed)),
             group=_sheets(mesh, faces, face_map) if carrier is None else carrier.sheets(face_map),
             flips=options.flips and (carrier is None or carrier.flips), spare=spare,
-            apart=mesh.opened if carrier is None else carrier.marked)
+            apart=mesh.opened if carrier is None else mesh.opened | carrier.marked)
     numbers = merged.copy()
     numbers[fitted.back] = len(placed) + np.arange(len(fitted.back))
     placed, corners, slots = fitted.vertices, fitted.faces, fitted.corner
