@@ -75,13 +75,13 @@ class Recording:
             yield len(results) / len(errors)
         return results
 
-
     def _level(self, count: int, options: Options) -> SimplifyResult:
+        """Return the level of so many triangles: of fewer, with vertices put back, or as it is where too few can be."""
         spare = spare_of(count, options, self.carrier) if count < self.record.faces_before else 0
         length = self.record.length_for(count - 2 * spare)
         spare = min(spare, max(count - self.record.left(length), 0) // 2)
         result = level(self.mesh, self.record, self.original, length, options, self.carrier, spare)
-        if spare and len(result.faces) < count - 1:  # not as many as wanted could come back
+        if spare and len(result.faces) < count - 1:
             length = self.record.length_for(count)
             result = level(self.mesh, self.record, self.original, length, options, self.carrier)
         return result
