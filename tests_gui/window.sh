@@ -13,6 +13,7 @@ rm -f "$GUI_OUT"/*.png
 if [ -z "${DISPLAY:-}" ]; then
     export LIBGL_ALWAYS_SOFTWARE=1 GALLIUM_DRIVER=llvmpipe
     # the screen takes a number that is free: others may have screens of their own
+    rm -f "$GUI_OUT/display"  # of a run before: it would be read before the new one is there
     Xvfb -displayfd 1 -screen 0 "${size}x24" +extension GLX -nolisten tcp >"$GUI_OUT/display" 2>"$GUI_OUT/screen.log" & screen=$!
     trap 'kill $screen 2>/dev/null || true' EXIT
     for _ in $(seq 200); do [ -s "$GUI_OUT/display" ] && break; sleep 0.1; done
