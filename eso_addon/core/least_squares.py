@@ -23,13 +23,14 @@ _STEPS = 4  # of conjugate gradients: each round starts near the answer, more ch
 class Samples(NamedTuple):
     """Samples of the original: (3, k) points in double and single precision, (k,) weights, (3, k) normals.
 
-    The normals of vertices are zero: at a sharp edge they are no face's.
+    The first v are vertices of it, (v,) these; their normals are zero: at a sharp edge they are no face's.
     """
 
     exact: Floats
     points: Floats
     weights: Floats
     normals: Floats
+    vertex: Ints
 
 
 def best_step(vertices: Floats, faces: Ints, samples: Samples, face: Ints, places: Floats) -> Floats:

@@ -36,8 +36,6 @@ class Recording:
     original : tuple of ndarray
         Vertices (n, 3) float64 and faces (m, 3) int64 as they were given.
     options : Options
-    least : int
-        Triangles at which the run was told to stop.
     carrier : Carrier, optional
         Puts on the levels what the mesh carries.
     """
@@ -46,13 +44,7 @@ class Recording:
     record: CollapseRecord
     original: Mesh
     options: Options
-    least: int
     carrier: Carrier | None = None
-
-    def reaches(self, count: int) -> bool:
-        """Tell whether the level of so many triangles is in the record, or is out of the engine's reach anyway."""
-        left = int(self.record.faces_left[-1]) if len(self.record) else self.record.faces_before
-        return count >= self.least or left > self.least
 
     def levels_steps(self, counts: Sequence[int], errors: Sequence[float], *,
                      refit: bool | None = None) -> Generator[float, None, list[SimplifyResult]]:
@@ -96,6 +88,7 @@ def recording_steps(original: Mesh, options: Options, least: int) -> Generator[f
         Vertices (n, 3) float64 and faces (m, 3) int64.
     options : Options
     least : int
+        Triangles of the coarsest level that is wanted.
     """
     vertices, faces = original
     mirror = mirror_of(vertices, faces, options.symmetry) if options.symmetry != "none" else None
@@ -121,7 +114,6 @@ def recording_steps(original: Mesh, options: Options, least: int) -> Generator[f
         blocks.close()
     record = in_input_units(record, mesh, vertices)
     if mirror is not None:  # each collapse stands for two
-        least = 2 * least + rest
         record = replace(record, faces_before=2 * record.faces_before + rest,
                          faces_left=2 * record.faces_left + rest)
-    return Recording(mesh, record, original, options, least, guidance.carrier)
+    return Recording(mesh, record, original, options, guidance.carrier)

@@ -14,7 +14,7 @@ from .flips import flip_edges
 from .least_squares import Samples, best_step
 from .mesh import bounds
 from .normals import face_area_vectors, face_areas, face_normals, lengths
-from .reinsertion import reinsert
+from .reinsertion import reinsert, with_parts
 
 Bools = NDArray[np.bool_]
 Floats = NDArray[Any]  # float64, or float32 where only a choice hangs on it
@@ -52,21 +52,10 @@ class Refitted(NamedTuple):
     back: Ints
 
 
-def refit(
-    vertices: Floats,
-    faces: Ints,
-    original_vertices: Floats,
-    original_faces: Ints,
-    *,
-    vertex_map: Ints | None = None,
-    fixed: Bools | None = None,
-    bound: Bools | None = None,
-    group: Ints | None = None,
-    rounds: int = _ROUNDS,
-    flips: bool = True,
-    spare: int = 0,
-    apart: Bools | None = None,
-) -> Refitted:
+def refit(vertices: Floats, faces: Ints, original_vertices: Floats, original_faces: Ints, *,
+          vertex_map: Ints | None = None, fixed: Bools | None = None, bound: Bools | None = None,
+          group: Ints | None = None, rounds: int = _ROUNDS, flips: bool = True, spare: int = 0,
+          apart: Bools | None = None) -> Refitted:
     """Fit a simplified mesh to its original by moving its vertices and flipping its edges.
 
     First the original vertices that are farthest from it come back, if any may. Each round finds the closest point on
@@ -100,12 +89,10 @@ def refit(
     flat = not face_area_vectors(original_vertices, original_faces).any()
     if len(faces) == 0 or rounds < 1 or flat or (held.all() and not flips):
         return Refitted(vertices.copy(), faces, np.arange(faces.size).reshape(faces.shape), np.zeros(0, np.int64))
-    fit, near, center, size = _begun(vertices, faces, original_vertices, original_faces, vertex_map, held)
+    fit, center, size = _begun(vertices, faces, original_vertices, original_faces, vertex_map, held)
     fit.bound, fit.group = bound, group
-    back = near[:0]
-    if spare:
-        back = fit.reinsert(near, spare, apart)
-        vertices = np.concatenate((vertices, original_vertices.take(back, axis=0)))
+    back = fit.reinsert(spare, apart)
+    vertices = np.concatenate((vertices, original_vertices.take(back, axis=0)))
     start = fit.vertices
     for done in range(rounds):
         fit.move()
@@ -117,25 +104,20 @@ def refit(
 
 
 def _begun(vertices: Floats, faces: Ints, original_vertices: Floats, original_faces: Ints, vertex_map: Ints | None,
-           held: Bools) -> tuple[_Fit, Ints, Floats, float]:
-    """Return what is fitted, in a frame of its own, its samples that are vertices, and the frame's centre and size."""
+           held: Bools) -> tuple[_Fit, Floats, float]:
+    """Return what is fitted, in a frame of its own: about this centre, and of this size."""
     # unit size and the origin in the middle keep the precision of small parts of large scenes
     low, high = bounds(vertices)
     center, size = (low + high) / 2, float((high - low).max()) or 1.0
     wanted = max(_PER_FACE * len(faces), _LEAST)
-    samples, weights, near, normals, count = _samples(original_vertices, original_faces, wanted)
-    # single precision decides which face is near: it takes half the time, and positions are solved in double
-    exact = np.ascontiguousarray(((samples - center) / size).T)
-    points = exact.astype(np.float32)
+    samples, near = _samples((original_vertices - center) / size, original_faces, wanted)
     start = (vertices - center) / size
-    face = _first_faces(start, faces, points, None if vertex_map is None else vertex_map.take(near))
-    return _Fit(start, faces, Samples(exact, points, weights, normals), face, held), near[:count], center, size
+    face = _first_faces(start, faces, samples.points, None if vertex_map is None else vertex_map.take(near))
+    return _Fit(start, faces, samples, face, held), center, size
 
 
-def _samples(vertices: Floats, faces: Ints, wanted: int) -> tuple[Floats, Floats, Ints, Floats, int]:
-    """Return vertices and face centres, about `wanted` where there are more: points, weights, vertices near, normals.
-
-    The last number tells how many of them are vertices, which come first.
+def _samples(vertices: Floats, faces: Ints, wanted: int) -> tuple[Samples, Ints]:
+    """Return vertices and face centres, about `wanted` where there are more, and a vertex near each.
 
     Vertices hold the features, centres the area between: together they integrate squares over a triangle exactly.
     """
@@ -150,9 +132,10 @@ def _samples(vertices: Floats, faces: Ints, wanted: int) -> tuple[Floats, Floats
     centers += vertices.take(corners[:, 2], axis=0) / 3
     weights = np.concatenate([star[pick] / 12, areas[middle] * 0.75])
     normals = np.concatenate([np.zeros((len(pick), 3)), face_normals(vertices, corners)])
-    points = np.concatenate([vertices[pick], centers])
-    return (points, weights / weights.mean(), np.concatenate([pick, corners[:, 0]]), np.ascontiguousarray(normals.T),
-            len(pick))
+    exact = np.ascontiguousarray(np.concatenate([vertices[pick], centers]).T)
+    # single precision decides which face is near: it takes half the time, and positions are solved in double
+    samples = Samples(exact, exact.astype(np.float32), weights / weights.mean(), np.ascontiguousarray(normals.T), pick)
+    return samples, np.concatenate([pick, corners[:, 0]])
 
 
 def _evenly(count: int, share: float) -> Ints:
@@ -212,22 +195,26 @@ class _Fit:
             self._look()
         self.worst = min(self.worst, float(self.squared.max()))
 
-    def reinsert(self, near: Ints, wanted: int, apart: Bools | None) -> Ints:
-        """Make vertices of the farthest samples that are the original's vertices `near`; return which these were."""
-        count = len(near)
-        squared = self.squared[:count] if apart is None else np.where(apart.take(near), 0, self.squared[:count])
-        weights = _barycentric(self.vertices, self.faces, self.face[:count], self.closest[:, :count])
-        made = reinsert(self.vertices, self.faces, self.neighbors, self.samples.exact[:, :count], squared,
-                        self.face[:count], weights, wanted, self._free_sides())
+    def reinsert(self, wanted: int, apart: Bools | None) -> Ints:
+        """Make vertices of the farthest samples that are the original's vertices; return which of these."""
+        vertex = self.samples.vertex
+        if not wanted:
+            return vertex[:0]
+        some = slice(len(vertex))
+        squared = self.squared[some] if apart is None else np.where(apart.take(vertex), 0, self.squared[some])
+        weights = _barycentric(self.vertices, self.faces, self.face[some], self.closest[:, some])
+        made = reinsert(self.vertices, self.faces, self.neighbors, self.samples.exact[:, some], squared,
+                        self.face[some], weights, wanted, self._free_sides())
+        new = np.zeros(len(made.chosen), bool)
         self.vertices = np.concatenate((self.vertices, self.samples.exact[:, made.chosen].T))
-        self.held = np.concatenate((self.held, np.zeros(len(made.chosen), bool)))
+        self.held = np.concatenate((self.held, new))
         if self.bound is not None:
-            self.bound = np.concatenate((self.bound, np.zeros(len(made.chosen), bool)))
+            self.bound = np.concatenate((self.bound, new))
         if self.group is not None:
-            self.group = self.group.take(made.corner[:, 0] // 3)
-        self._changed(made.faces, made.corner, made.changed)
+            self.group = with_parts(self.group, made.corner)
+        self._changed(made.faces, made.corner)
         self.worst = float(self.squared.max())
-        return near.take(made.chosen)
+        return vertex.take(made.chosen)
 
     def _free_sides(self) -> Bools:
         """Tell the sides, (3, m), that no line runs along."""
@@ -240,21 +227,23 @@ class _Fit:
             free &= self.group.take(self.neighbors) == self.group
         return free
 
-    def _changed(self, faces: Ints, corner: Ints, changed: Bools) -> None:
-        """Take other faces, whose corners these were, and look again at the samples of those that changed."""
+    def _changed(self, faces: Ints, corner: Ints) -> None:
+        """Take other faces, whose corners these were, and look again at the samples beside what is not as it was."""
+        kept = np.zeros(len(faces), bool)
+        kept[: len(self.faces)] = (faces[: len(self.faces)] == self.faces).all(axis=1)
+        if kept.all():
+            return
         self.faces, self.corner = faces, self.corner.ravel().take(corner)
         self.start = self.vertices
         self.neighbors = _face_neighbors(faces, len(self.vertices))
-        self._look(self._beside(changed))
+        self._look(self._beside(~kept))
 
     def flip(self) -> None:
         """Flip edges where that brings the samples nearer."""
         points, weights, normals = self.samples.points, self.samples.weights, self.samples.normals
         corner, self.face = flip_edges(self.vertices, self.faces, points, normals, weights, self.face, self.squared,
                                        bound=self.bound, group=self.group)
-        changed = (corner != np.arange(corner.size).reshape(-1, 3)).any(axis=1)
-        if changed.any():
-            self._changed(self.faces.ravel().take(corner), corner, changed)
+        self._changed(self.faces.ravel().take(corner), corner)
 
 
 def _first_faces(vertices: Floats, faces: Ints, points: Floats, survivor: Ints | None) -> Ints:

@@ -43,14 +43,11 @@ class Reinserted(NamedTuple):
         The given faces in their places, those that were split smaller, and the new ones.
     corner : ndarray, (m + 2 c, 3) int64
         The corner that each was, as 3 * face + number; of a new vertex one of a face that it split.
-    changed : ndarray, (m + 2 c,) bool
-        The faces that are not what they were.
     """
 
     chosen: Ints
     faces: Ints
     corner: Ints
-    changed: Bools
 
 
 def reinsert(vertices: Floats, faces: Ints, neighbors: Ints, points: Floats, squared: Floats, face: Ints,
@@ -145,4 +142,4 @@ def _split(faces: Ints, chosen: Ints, own: Ints, far: Ints, inside: Bools, verte
     number[other] = across
     number[len(faces):] = np.repeat(np.arange(len(chosen)), 2)
     split = np.where(is_new, vertex_count + number[:, None], faces.ravel().take(corner))
-    return Reinserted(chosen, split, corner, is_new.any(axis=1))
+    return Reinserted(chosen, split, corner)
