@@ -36,7 +36,7 @@ export function makeStream(line, wish, show, tell) {
   let levels = []; // places of each mesh in the last picture
   let shown = 0; // their triangles
   let drawing = false;
-  let posted = -STEP;
+  let posted = -Infinity; // the first picture waits for none before it
   let timer;
   let told = 0;
   let whole = {};
@@ -75,6 +75,7 @@ export function makeStream(line, wish, show, tell) {
         let text = known ? error.message : large ? 'The mesh is too large for this device.' : 'The file is damaged.';
         const seconds = Math.min(0.5 * 2 ** attempt++, 10);
         if (error.again) text += ` What came is shown; trying again in ${Math.ceil(seconds)} s.`;
+        present(true); // what came is shown, before it is said
         tell({ type: 'trouble', text, failed: !error.again });
         troubled = true;
         retry = false;
