@@ -49,6 +49,7 @@ def flip_edges(
     *,
     bound: Bools | None = None,
     group: Ints | None = None,
+    among: Bools | None = None,
 ) -> tuple[Ints, Ints]:
     """Flip edges that bring a surface nearer to samples of its original (Hoppe et al. 1993, section 4.2: edge swap).
 
@@ -63,6 +64,8 @@ def flip_edges(
         An edge between two such vertices stays.
     group : (m,) int64, optional
         An edge between faces of different groups stays.
+    among : (m,) bool, optional
+        An edge with none of these faces stays.
 
     Returns
     -------
@@ -70,7 +73,7 @@ def flip_edges(
         For each corner of the new faces the old corner that it was, as 3 * face + number; the new nearest faces.
     """
     corner, face = np.arange(faces.size).reshape(faces.shape), face.copy()
-    pairs = _flippable(vertices, faces, bound, group)
+    pairs = _flippable(vertices, faces, bound, group, among)
     if len(pairs.one) == 0:
         return corner, face
     order = sorting_order(face)
@@ -95,7 +98,7 @@ def flip_edges(
     return corner, face
 
 
-def _flippable(vertices: Floats, faces: Ints, bound: Bools | None, group: Ints | None) -> _Pairs:
+def _flippable(vertices: Floats, faces: Ints, bound: Bools | None, group: Ints | None, among: Bools | None) -> _Pairs:
     """Return the edges whose flip keeps a manifold mesh of well-shaped faces that look the same way."""
     count = len(vertices)
     begin, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
@@ -111,6 +114,8 @@ def _flippable(vertices: Floats, faces: Ints, bound: Bools | None, group: Ints |
         good &= ~(bound.take(begin.take(one)) & bound.take(end.take(one)))
     if group is not None:
         good &= group.take(one // 3) == group.take(other // 3)
+    if among is not None:
+        good &= among.take(one // 3) | among.take(other // 3)
     one, other = one[good], other[good]
     left, right = _before(one), _before(other)
     a, b = begin.take(left), begin.take(right)

@@ -39,7 +39,9 @@ class Options:
     placement : str
         "optimal", or "endpoint": half-edge collapse, survivors stay where they are.
     weight_power : float
-        The weights enter the quadrics raised to this power.
+        The weights enter the quadrics raised to this power,
+    weight_floor : float
+        but none counts for less than this part of the mean one.
     area_weighted : bool
         Weigh planes by their faces' areas; without it by one, as printed.
     boundary_weight : float
@@ -82,6 +84,7 @@ class Options:
     rings: int = 3
     placement: str = "optimal"
     weight_power: float = 0.5
+    weight_floor: float = 0.3
     area_weighted: bool = True
     boundary_weight: float = 10.0
     memory: float = 1e-11
@@ -113,6 +116,7 @@ class Options:
             raise MeshError(f"unknown placement {self.placement!r}: choose optimal or endpoint")
         number("rings", self.rings, 1, 1000, whole=True)
         number("weight_power", self.weight_power, 0, 4)
+        number("weight_floor", self.weight_floor, 0, 1)
         number("boundary_weight", self.boundary_weight, 0, 1e6)
         # less than this is lost in rounding, and flat regions could not be solved
         number("memory", self.memory, 1e-12, 1)
@@ -152,9 +156,8 @@ class Options:
 # the equations as printed: planes of weight one, weights once and to the first power, nothing held, edges only
 PRESETS: dict[str, dict[str, Any]] = {
     "default": {},
-    "paper": {"weight_power": 1.0, "area_weighted": False, "boundary_weight": 0.0, "memory": 1e-9, "flip": 0.2,
-              "share": 0.05,
-              "guard": False, "refit": False},
+    "paper": {"weight_power": 1.0, "weight_floor": 0.0, "area_weighted": False, "boundary_weight": 0.0, "memory": 1e-9,
+              "flip": 0.2, "share": 0.05, "guard": False, "refit": False},
 }
 
 

@@ -20,7 +20,7 @@ Bools = NDArray[np.bool_]
 Floats = NDArray[Any]  # float64, or float32 where only a choice hangs on it
 Ints = NDArray[np.int64]
 
-_ROUNDS = 3
+_ROUNDS = 5
 _PER_FACE = 10
 _LEAST = 5000  # and at least so many in all: they are soon done, and miss nothing of a small mesh
 _TURN = 0.5  # least cosine between a face's normals before and after
@@ -153,6 +153,7 @@ class _Fit:
         self.samples, self.face, self.held = samples, face, held
         self.bound: Bools | None = None
         self.group: Ints | None = None
+        self.fresh: Bools | None = None  # faces that the last flips made; edges of others were no better flipped
         self.start = vertices  # since the last flips: what faces turn against
         self.neighbors = _face_neighbors(faces, len(vertices))
         self.squared, self.closest = np.empty(len(face)), np.empty_like(samples.points)
@@ -180,16 +181,16 @@ class _Fit:
         now, faces = self.vertices, self.faces
         step = best_step(now, faces, self.samples, self.face, _barycentric(now, faces, self.face, self.closest))
         step[self.held] = 0
-        share = np.ones(len(now))
+        share, judged = np.ones(len(now)), np.arange(len(faces))
         for _ in range(2 * _HALVINGS):
-            before, self.vertices = self.vertices, _without_flips(now, share[:, None] * step, faces, self.start)
+            _hold_flips(now, step, share, faces, self.start, judged)
+            before, self.vertices = self.vertices, now + share[:, None] * step
             moved = (self.vertices != before).any(axis=1)
             self._look(self._beside(moved.take(faces).any(axis=1)))
             bad = self.squared > self.worst * (1 + _SINGLE)
             if not bad.any():
                 break
-            back = np.unique(faces[self.face[bad]])
-            share[back] = np.where(share[back] > 0.5**_HALVINGS, share[back] / 2, 0)
+            judged = _halve(share, faces, self.face[bad])
         else:
             self.vertices = now
             self._look()
@@ -227,23 +228,27 @@ class _Fit:
             free &= self.group.take(self.neighbors) == self.group
         return free
 
-    def _changed(self, faces: Ints, corner: Ints) -> None:
-        """Take other faces, whose corners these were, and look again at the samples beside what is not as it was."""
+    def _changed(self, faces: Ints, corner: Ints) -> Bools:
+        """Take other faces, whose corners these were, and tell those that are not as they were.
+
+        The samples beside these are looked up again.
+        """
         kept = np.zeros(len(faces), bool)
         kept[: len(self.faces)] = (faces[: len(self.faces)] == self.faces).all(axis=1)
         if kept.all():
-            return
+            return ~kept
         self.faces, self.corner = faces, self.corner.ravel().take(corner)
         self.start = self.vertices
         self.neighbors = _face_neighbors(faces, len(self.vertices))
         self._look(self._beside(~kept))
+        return ~kept
 
     def flip(self) -> None:
         """Flip edges where that brings the samples nearer."""
         points, weights, normals = self.samples.points, self.samples.weights, self.samples.normals
         corner, self.face = flip_edges(self.vertices, self.faces, points, normals, weights, self.face, self.squared,
-                                       bound=self.bound, group=self.group)
-        self._changed(self.faces.ravel().take(corner), corner)
+                                       bound=self.bound, group=self.group, among=self.fresh)
+        self.fresh = self._changed(self.faces.ravel().take(corner), corner)
 
 
 def _first_faces(vertices: Floats, faces: Ints, points: Floats, survivor: Ints | None) -> Ints:
@@ -330,27 +335,32 @@ def _barycentric(vertices: Floats, faces: Ints, face: Ints, points: Floats) -> F
     return weights
 
 
-def _without_flips(vertices: Floats, step: Floats, faces: Ints, start: Floats) -> Floats:
-    """Return the vertices after the step, halved and at last left out around faces turned or thinned since the start.
+def _hold_flips(vertices: Floats, step: Floats, share: Floats, faces: Ints, start: Floats, judged: Ints) -> None:
+    """Halve the share of the step, and at last take none, around those faces that turn or get thin since the start.
 
-    The vertices themselves must hold no such face.
+    The vertices themselves must hold no such face; the share changes in place.
     """
-    before, shape = face_area_vectors(start, faces), _shape(start, faces)
-    size = lengths(before)
-    factor = np.ones(len(vertices))
-    while True:
-        moved = vertices + factor[:, None] * step
-        after = face_area_vectors(moved, faces)
-        turned = np.einsum("ij,ij->i", before, after) < _TURN * size * lengths(after)
-        bad = (turned | (_shape(moved, faces) < _SHAPE * shape)) & (factor.take(faces).max(axis=1) > 0)
-        if not bad.any():
-            return np.where(factor[:, None] > 0, moved, vertices)
-        corners = faces[bad].ravel()
-        factor[corners] = np.where(factor[corners] > 0.5**_HALVINGS, factor[corners] / 2, 0)
+    while len(judged):
+        corners = faces.take(judged, axis=0)
+        moved: Floats = vertices + share[:, None] * step
+        before, after = face_area_vectors(start, corners), face_area_vectors(moved, corners)
+        size, area = lengths(before), lengths(after)
+        bad = np.einsum("ij,ij->i", before, after) < _TURN * size * area
+        bad |= area * _squared_sides(start, corners) < _SHAPE * size * _squared_sides(moved, corners)
+        bad &= share.take(corners).max(axis=1) > 0
+        judged = _halve(share, faces, judged[bad])
 
 
-def _shape(vertices: Floats, faces: Ints) -> Floats:
-    """Return the area of each face over the sum of its squared edges, zero for a point."""
+def _halve(share: Floats, faces: Ints, bad: Ints) -> Ints:
+    """Halve the shares of these faces' corners, in place, and return the faces around them."""
+    corners = np.unique(faces.take(bad, axis=0))
+    share[corners] = np.where(share[corners] > 0.5**_HALVINGS, share[corners] / 2, 0)
+    touched = np.zeros(len(share), bool)
+    touched[corners] = True
+    return np.flatnonzero(touched.take(faces).any(axis=1))
+
+
+def _squared_sides(vertices: Floats, faces: Ints) -> Floats:
+    """Return the sum of each face's squared edges."""
     a, b, c = (vertices.take(faces[:, corner], axis=0) for corner in range(3))
-    squares = ((b - a) ** 2).sum(axis=1) + ((c - b) ** 2).sum(axis=1) + ((a - c) ** 2).sum(axis=1)
-    return lengths(face_area_vectors(vertices, faces)) / np.maximum(squares, 1e-300)
+    return ((b - a) ** 2).sum(axis=1) + ((c - b) ** 2).sum(axis=1) + ((a - c) ** 2).sum(axis=1)

@@ -14,7 +14,7 @@ Bools = NDArray[np.bool_]
 Floats = NDArray[Any]  # float64, or float32 where only a choice hangs on it
 Ints = NDArray[np.int64]
 
-_SHARE = 200  # one vertex for so many triangles: it costs two of them
+_SHARE = 100  # one vertex for so many triangles: it costs two of them
 _INSIDE = 0.1  # least weight of a corner where a vertex goes into the face; else it goes onto the side opposite
 _SHAPE = 0.02  # least area over squared edges of the new faces
 _ROUNDING = 1e-12  # squared distances of vertices that lie on the surface, which has about unit size

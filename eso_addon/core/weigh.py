@@ -15,6 +15,8 @@ from .variation import surface_variation
 
 # a border of materials is seen at once, a seam only where the texture differs across it
 _BORDER = 10.0
+# least weight of all: planes of none could not be solved
+_LEAST = 1e-6
 
 
 def initial_quadrics(mesh: Prepared, options: Options, blocks: Blocks, guidance: Guidance | None = None) -> Floats:
@@ -50,7 +52,7 @@ def initial_quadrics(mesh: Prepared, options: Options, blocks: Blocks, guidance:
         weights = surface_variation(mesh.points.T, mesh.faces.T, rings, blocks)
         mean = weights.mean()
         if mean > 0:
-            parts *= np.maximum(weights / mean, 1e-6) ** options.weight_power
+            parts *= factors(weights / mean, options)
     if guidance is not None and guidance.importance is not None:
         parts *= guidance.importance
     quadrics = anchored(parts, mesh.points, options.memory)
@@ -58,6 +60,14 @@ def initial_quadrics(mesh: Prepared, options: Options, blocks: Blocks, guidance:
         return quadrics
     return with_attributes(quadrics, mesh.points, guidance.lines, guidance.layers, options.attribute_weight,
                            guidance.importance)
+
+
+def factors(weights: Floats, options: Options) -> Floats:
+    """Return what the quadrics are multiplied by for these weights, (n,): each at least a part of their mean.
+
+    Beside sharp edges, whose weights are a hundred times the others', smooth faces would else count for nothing.
+    """
+    return np.maximum(weights, max(options.weight_floor * weights.mean(), _LEAST)) ** options.weight_power
 
 
 def line_quadrics(points: Floats, lines: Lines, weight: float) -> Floats:

@@ -19,7 +19,7 @@ from ..core.record import CollapseRecord
 from ..core.refit import refit
 from ..core.steps import run_to_end
 from ..core.variation import surface_variation
-from ..core.weigh import initial_quadrics
+from ..core.weigh import factors, initial_quadrics
 
 STEPS = 512  # points of a ladder
 
@@ -150,7 +150,7 @@ def _quadrics(mesh: Prepared, options: Options, scale: float, blocks: Blocks) ->
     if plain is not options:
         rings = 1 if options.method == "so" else int(options.rings)
         weights = surface_variation(mesh.points.T, mesh.faces.T, rings, blocks) * (scale / mesh.size)
-        quadrics *= (np.maximum(weights, 1e-6) ** options.weight_power)[:, None]
+        quadrics *= factors(weights, options)[:, None]
     return quadrics
 
 

@@ -33,8 +33,8 @@ def test_distances_of_the_table(cow: Mesh) -> None:
 
 def test_nothing_but_the_equations(cow: Mesh) -> None:
     """Unit planes, the weights as they are, no boundary planes, no guard, no refit."""
-    spelt = {"method": "eso", "rings": 3, "weight_power": 1.0, "area_weighted": False, "boundary_weight": 0.0,
-             "guard": False, "refit": False, "placement": "optimal"}
+    spelt = {"method": "eso", "rings": 3, "weight_power": 1.0, "weight_floor": 0.0, "area_weighted": False,
+             "boundary_weight": 0.0, "guard": False, "refit": False, "placement": "optimal"}
     paper, same = (simplify(*cow, faces_target=580, preset="paper", **options) for options in ({}, spelt))
     assert_array_equal(paper.vertices, same.vertices)
     assert_array_equal(paper.faces, same.faces)
