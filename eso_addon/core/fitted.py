@@ -86,12 +86,12 @@ def fitted(layer: Layer, rows: Floats, elements: Ints, joint: Ints, free: Bools,
     values = equations.best_values(start, _unit(wanted) if layer.kind == "normal" else wanted, ~held)
     if layer.kind == "normal":
         values = _unit(values)
-    elif layer.kind != "uv":
+    else:  # colours stay colours, and a map that fills its image does not reach over to the other side of it
         values = values.clip(layer.rows.min(axis=0)[:, None], layer.rows.max(axis=0)[:, None])
     step = values - start
     step[:, held | (np.abs(step).max(axis=0) <= _ROUNDING * np.abs(start).max(initial=0))] = 0
     if layer.kind == "uv":
-        step = _without_turns(start, step, joint.take(faces))
+        step = without_turns(start, step, joint.take(faces))
     moved = np.flatnonzero(step.any(axis=0).take(joint))
     rows = rows.copy()
     new = (start + step).T.take(joint.take(moved), axis=0)
@@ -103,7 +103,7 @@ def _unit(columns: Floats) -> Floats:
     return columns / np.maximum(np.sqrt((columns * columns).sum(axis=0)), 1e-30)
 
 
-def _without_turns(uv: Floats, step: Floats, faces: Ints) -> Floats:
+def without_turns(uv: Floats, step: Floats, faces: Ints) -> Floats:
     """Return the step, halved and at last left out around triangles that would turn over or lose most of their area."""
     before = areas_of(uv.T.take(faces, axis=0))
     factor = np.ones(uv.shape[1])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The least squares of a refit: what vertices need so that given places of their faces are, or have, what samples do."""
+"""The least squares of a refit: what vertices need so that given places of faces are, or have, what samples do."""
 
 from __future__ import annotations
 
