@@ -12,7 +12,6 @@ Floats = NDArray[Any]
 Ints = NDArray[np.int64]
 
 _GAUSS = 0.5 - 0.5 / np.sqrt(3)  # where two samples of an edge integrate cubics along it
-_STRIP = 0.5  # a line counts as a strip of surface so wide, beside the side of a square as large as a face
 
 
 class Curves:
@@ -58,8 +57,8 @@ class Curves:
         self.lengths = np.tile(np.sqrt(((b - a) ** 2).sum(axis=0)) / 2, 2)
 
     def weights(self, area: float, faces: int) -> Floats:
-        """Return what the samples weigh, as parts of the whole surface of this area and so many faces."""
-        return self.lengths * _STRIP * np.sqrt(area / faces) / max(area, 1e-300)
+        """Return what the samples weigh, as parts of a surface of this area: a line is a strip as wide as a face."""
+        return self.lengths * np.sqrt(area / faces) / max(area, 1e-300)
 
     def look(self, vertices: Floats) -> tuple[Ints, Floats]:
         """Return the nearest edge of each sample, (k,), and the weights of its two ends there, (2, k)."""
