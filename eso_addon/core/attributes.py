@@ -65,6 +65,11 @@ class Layer:
         """Whether values between have a meaning."""
         return self.kind in ("uv", "normal", "color", "value", "rotation")
 
+    @property
+    def fits(self) -> bool:
+        """Whether values at vertices are chosen for what is seen between them."""
+        return self.kind in ("uv", "normal", "color") and self.rows.shape[1] > 0
+
     def shaped(self, rows: NDArray) -> NDArray:
         """Return rows of new elements in the shape and dtype in which the attribute was given."""
         lead = (-1, 3) if self.per_corner else (len(rows),)

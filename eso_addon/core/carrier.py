@@ -14,9 +14,11 @@ from .attributes import AttributeSet, Layer, blended
 from .carried import Carried
 from .carry import Ground, Places, find_places, numbered, positions
 from .edge_data import carried_edges
+from .fitted import Sampled, fitted, joints, on_same_side
 from .lines import Lines
 from .mesh import Bools, Floats, Ints
 from .prepare import Prepared
+from .refit import Refitted
 from .reinsertion import with_parts
 from .symmetry import Mirror, completed
 from .unflip import areas_of, mapped_by_source, turned_back
@@ -36,6 +38,7 @@ class _Level(NamedTuple):
     unmoved: Bools
     face_map: Ints
     there: Floats
+    sampled: Sampled | None
 
 
 class Carrier:
@@ -67,15 +70,20 @@ class Carrier:
         self._points = np.ascontiguousarray(original[0].take(mesh.source, axis=0).T)
         self._ground: Ground | None = None
         self._vertex = faces.ravel().take(lines.corner)  # the input's vertex at each corner
-        self._held = locked.copy()
+        self._locked, self._held = locked, locked.copy()
         self._held[lines.edges] = True
         self.messages = (*attributes.messages, *lines.messages)
 
     def held(self, survivor: Ints, count: int) -> Bools:
-        """Tell the level's vertices, (count,) bool, that stand on lines or are locked: a refit must leave them."""
+        """Tell the level's vertices, (count,) bool, that are locked: a refit must leave them."""
         held = np.zeros(count + 1, bool)
-        held[survivor.compress(self._held)] = True  # those that are gone write beyond the end
+        held[survivor.compress(self._locked)] = True  # those that are gone write beyond the end
         return held[:-1]
+
+    @property
+    def line_edges(self) -> Ints:
+        """The engine's edges that are lines, (2, s) int64."""
+        return self._lines.edges
 
     @property
     def flips(self) -> bool:
@@ -107,7 +115,7 @@ class Carrier:
         return marked
 
     def carry(self, placed: Floats, corners: Ints, face_map: Ints, survivor: Ints,
-              slots: Ints | None = None, back: Ints | None = None) -> Carried:
+              fit: Refitted) -> Carried:
         """Put everything on a level.
 
         Parameters
@@ -120,10 +128,8 @@ class Carrier:
             The engine's face of each.
         survivor : ndarray, (engine's vertices,) int64
             The level's vertex that each had become before any came back, -1 if it is gone.
-        slots : ndarray, (f, 3) int64, optional
-            Where edges have flipped: for each corner the one that it was before, as 3 * face + number.
-        back : ndarray, (c,) int64, optional
-            The engine's vertices that are the level's last ones, put back into faces of `face_map`.
+        fit : Refitted
+            What has become of the level's faces, and where samples of the original lie on them.
         """
         survivor = np.where(survivor < 0, len(placed), survivor)
         if self._mirror is not None:
@@ -138,11 +144,10 @@ class Carrier:
         if self._mesh.turned is not None:
             rows[1:, self._mesh.turned[face_map]] = [[2], [1]]
         slot = (rows * self._lines.faces.shape[1] + face_map).T.ravel()
-        if slots is not None:
-            slot = slot.take(slots.ravel())
-            face_map = with_parts(face_map, slots)
-        target = places.target.ravel().take(slot)
-        if back is not None and len(back):
+        slot = slot.take(fit.corner.ravel())
+        face_map = with_parts(face_map, fit.corner)
+        target, back = places.target.ravel().take(slot), fit.back
+        if len(back):
             fresh = np.flatnonzero(corners.ravel() >= len(placed) - len(back))
             number = corners.ravel().take(fresh) - (len(placed) - len(back))
             own = self._corner_of.take(back)
@@ -151,7 +156,10 @@ class Carrier:
         number, wedge_of, vertex_map = self._part(places, slot, target)
         vertex = self._lines.faces.ravel().take(slot)
         unmoved = (self._points == there.take(survivor, axis=1)).all(axis=0).take(vertex)
-        at = _Level(places, self._lines.corner.ravel().take(slot), vertex, target, wedge_of, unmoved, face_map, there)
+        sampled = None if fit.met is None else on_same_side(Sampled(fit.source, fit.met), self._lines, places,
+                                                            target.reshape(-1, 3))
+        at = _Level(places, self._lines.corner.ravel().take(slot), vertex, target, wedge_of, unmoved, face_map, there,
+                    sampled)
         carried = self._values(self._own, at)
         points, parted = placed.take(places.vertex.take(wedge_of), axis=0), number.reshape(-1, 3)
         edges, on_edges = carried_edges(self._own, self._points, self._mesh.vertex, self._lines, survivor,
@@ -189,7 +197,7 @@ class Carrier:
                 if layer.kind == "uv":
                     values = self._turned_back(layer, values, at)
             elif layer.domain == "vertex":
-                values = self._at_wedges(layer, at.places, self._vertex).take(at.wedge_of, axis=0)
+                values = self._at_wedges(layer, at, self._vertex).take(at.wedge_of, axis=0)
             elif layer.domain == "face":
                 values = layer.rows.take(self._mesh.face.take(at.face_map), axis=0)
             else:
@@ -205,7 +213,7 @@ class Carrier:
         return rows[:-1]
 
     def _at_corners(self, layer: Layer, at: _Level) -> NDArray:
-        values = self._at_wedges(layer, at.places, self._lines.corner).take(at.target, axis=0)
+        values = self._at_wedges(layer, at, self._lines.corner).take(at.target, axis=0)
         values[at.unmoved] = layer.rows.take(at.corner[at.unmoved], axis=0)
         return values
 
@@ -231,8 +239,18 @@ class Carrier:
             values.reshape(-1, 3, 2)[over] = source[over]  # turned over in space too
         return values
 
-    def _at_wedges(self, layer: Layer, places: Places, elements: Ints) -> NDArray:
-        return blended(layer, elements.take(places.face, axis=1), places.weights)
+    def _at_wedges(self, layer: Layer, at: _Level, elements: Ints) -> NDArray:
+        """Return what the wedges of a level have: what is at their places, then fitted to the samples."""
+        places = at.places
+        rows = blended(layer, elements.take(places.face, axis=1), places.weights)
+        if at.sampled is None or not layer.fits or layer.name in self._lines.scattered:
+            return rows
+        joint = joints(layer, self._lines, elements, places)
+        points = np.zeros((3, int(joint.max(initial=-1)) + 1))
+        points[:, joint] = at.there.take(places.vertex, axis=1)
+        free = np.ones(len(joint), bool)
+        free[at.target[at.unmoved]] = False
+        return fitted(layer, rows, elements, joint, free, at.sampled, points, at.target.reshape(-1, 3))
 
     def _part(self, places: Places, slot: Ints, target: Ints) -> tuple[Ints, Ints, Ints]:
         """Part the level's vertices as the input's are: at lines where its faces have different vertices.

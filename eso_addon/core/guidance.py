@@ -63,8 +63,7 @@ def guidance_of(mesh: Prepared, original: tuple[Floats, Ints], options: Options,
     vertices, faces = original
     locked = np.zeros(mesh.points.shape[1], bool)
     if options.boundary_lines == "locked":
-        locked[mesh.faces.ravel().take(mesh.boundary)] = True
-        locked[np.roll(mesh.faces, -1, axis=0).ravel().take(mesh.boundary)] = True
+        locked[mesh.boundary_edges] = True
     if options.locked is not None:
         chosen = _per_vertex("locked", options.locked, len(vertices)) != 0
         locked[mesh.vertex[chosen & (mesh.vertex >= 0)]] = True

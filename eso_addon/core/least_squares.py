@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The least squares of a refit: where vertices go so that given places of their faces come near to samples."""
+"""The least squares of a refit: what vertices need so that given places of faces are, or have, what samples do."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from .normals import face_area_vectors, face_normals, lengths
 
+Bools = NDArray[np.bool_]
 Floats = NDArray[Any]  # float64, or float32 where only a choice hangs on it
 Ints = NDArray[np.int64]
 
@@ -23,7 +24,8 @@ _STEPS = 4  # of conjugate gradients: each round starts near the answer, more ch
 class Samples(NamedTuple):
     """Samples of the original: (3, k) points in double and single precision, (k,) weights, (3, k) normals.
 
-    The first v are vertices of it, (v,) these; their normals are zero: at a sharp edge they are no face's.
+    The first v are vertices of it, (v,) these; their normals are zero: at a sharp edge they are no face's. The others
+    are centres of its faces, (k - v,) these.
     """
 
     exact: Floats
@@ -31,49 +33,75 @@ class Samples(NamedTuple):
     weights: Floats
     normals: Floats
     vertex: Ints
+    face: Ints
+
+
+class Meeting(NamedTuple):
+    """Where samples lie nearest to a surface: (k,) the face, (3, k) its corners' shares there, (k,) weights."""
+
+    face: Ints
+    places: Floats
+    weights: Floats
+
+
+class Equations:
+    """The damped normal equations of values at vertices that are to be those of samples where these meet the faces.
+
+    They are kept as one symmetric 3 by 3 block a face.
+    """
+
+    def __init__(self, vertices: Floats, faces: Ints, met: Meeting) -> None:
+        self._corners, self._size, self._met = np.ascontiguousarray(faces.T), len(vertices), met
+        self._heavy = met.weights * met.places
+        self._blocks = {(i, j): self._sums(self._heavy[i] * met.places[j]) for i in range(3) for j in range(i, 3)}
+        # evenly spread samples would put a sixth of a face's weight on the diagonal of each of its corners
+        share = lengths(face_area_vectors(vertices, faces))
+        share *= met.weights.sum() / (6 * max(float(share.sum()), 1e-300))
+        self._damping = _DAMPING * self.gather([share] * 3) + 1e-9
+        self.diagonal = self._damping + self.gather([self._blocks[i, i] for i in range(3)])
+
+    def _sums(self, values: Floats) -> Floats:
+        return _sums(self._met.face, values, self._corners.shape[1])
+
+    def gather(self, values: list[Floats]) -> Floats:
+        """Return the sums over the faces around each vertex of values at the faces' corners."""
+        return _gather(values, self._corners, self._size)
+
+    def pull(self, values: Floats, wanted: Floats) -> Floats:
+        """Return the right side, (c, k), for (c, k) values at the vertices and (c, s) that the samples have."""
+        rows = []
+        for row, goal in zip(values, wanted, strict=True):
+            rest = goal.copy()
+            for place, corner in zip(self._met.places, self._corners, strict=True):
+                rest -= place * row.take(corner.take(self._met.face))
+            rows.append(self.gather([self._sums(heavy * rest) for heavy in self._heavy]))
+        return np.stack(rows)
+
+    def times(self, step: Floats) -> Floats:
+        """Return the matrix times a (c, k) step."""
+        out, blocks = self._damping * step, self._blocks
+        for row, total in zip(step, out, strict=True):
+            x, y, z = row.take(self._corners)
+            total += self.gather([blocks[0, 0] * x + blocks[0, 1] * y + blocks[0, 2] * z,
+                                  blocks[0, 1] * x + blocks[1, 1] * y + blocks[1, 2] * z,
+                                  blocks[0, 2] * x + blocks[1, 2] * y + blocks[2, 2] * z])
+        return out
+
+    def best_values(self, values: Floats, wanted: Floats, free: Bools) -> Floats:
+        """Return (c, k) values that fit (c, s) of the samples, from `values` on; only those that are free change."""
+        pull = self.pull(values, wanted) * free
+        return values + _conjugate_gradients(lambda step: self.times(step) * free, pull, self.diagonal)
 
 
 def best_step(vertices: Floats, faces: Ints, samples: Samples, face: Ints, places: Floats) -> Floats:
-    """Return the (k, 3) step that brings the points at `places` of their faces near to the samples, level with them.
-
-    The normal equations are kept as one symmetric 3 by 3 block a face for the distances, and one for the tilts.
-    """
-    count, columns = len(faces), np.ascontiguousarray(vertices.T)
-    weights = samples.weights
-    residual = samples.exact.copy()
-    for corner in range(3):
-        residual -= places[corner] * columns.take(faces[:, corner].take(face), axis=1)
-    heavy = weights * places
-    blocks = {(i, j): _sums(face, heavy[i] * places[j], count) for i in range(3) for j in range(i, 3)}
-    corners = np.ascontiguousarray(faces.T)
-    pull = np.stack(
-        [_gather([_sums(face, heavy[i] * row, count) for i in range(3)], corners, len(vertices)) for row in residual]
-    )
-    # evenly spread samples would put a sixth of a face's weight on the diagonal of each of its corners
-    share = lengths(face_area_vectors(vertices, faces))
-    share *= weights.sum() / (6 * max(float(share.sum()), 1e-300))
-    damping = _DAMPING * _gather([share] * 3, corners, len(vertices)) + 1e-9
-    diagonal = damping + _gather([blocks[i, i] for i in range(3)], corners, len(vertices))
+    """Return the (k, 3) step that brings the points at `places` of their faces near to the samples, level with them."""
+    equations = Equations(vertices, faces, Meeting(face, places, samples.weights))
+    columns, corners = np.ascontiguousarray(vertices.T), np.ascontiguousarray(faces.T)
     tilts = _tilts(vertices, faces, samples, face)
-    pull -= _tilt(tilts, columns, corners)
-    diagonal = diagonal + np.stack([_gather([2 * tilts[axis, axis]] * 3, corners, len(vertices)) for axis in range(3)])
-
-    def apply(step: Floats) -> Floats:
-        out = damping * step + _tilt(tilts, step, corners)
-        for axis in range(3):
-            x, y, z = step[axis].take(corners)
-            out[axis] += _gather(
-                [
-                    blocks[0, 0] * x + blocks[0, 1] * y + blocks[0, 2] * z,
-                    blocks[0, 1] * x + blocks[1, 1] * y + blocks[1, 2] * z,
-                    blocks[0, 2] * x + blocks[1, 2] * y + blocks[2, 2] * z,
-                ],
-                corners,
-                len(vertices),
-            )
-        return out
-
-    return _conjugate_gradients(apply, pull, diagonal).T
+    pull = equations.pull(columns, samples.exact) - _tilt(tilts, columns, corners)
+    rises = np.stack([equations.gather([2 * tilts[axis, axis]] * 3) for axis in range(3)])
+    return _conjugate_gradients(lambda step: equations.times(step) + _tilt(tilts, step, corners), pull,
+                                equations.diagonal + rises).T
 
 
 def _tilts(vertices: Floats, faces: Ints, samples: Samples, face: Ints) -> Floats:
@@ -111,7 +139,7 @@ def _sums(index: Ints, values: Floats, count: int) -> Floats:
 
 
 def _conjugate_gradients(apply: Callable[[Floats], Floats], right: Floats, diagonal: Floats) -> Floats:
-    """Return about the solution of a positive definite system, three right sides at once, from zero on."""
+    """Return about the solution of a positive definite system, all right sides at once, from zero on."""
     answer, rest = np.zeros_like(right), right.copy()
     scaled = rest / diagonal
     direction = scaled.copy()

@@ -95,7 +95,7 @@ def level(mesh: Prepared, record: CollapseRecord, original: Mesh, length: int,
     number[alive] = np.arange(len(alive))
     corners, placed = number.take(corners), points.take(alive, axis=0)
     merged = number.take(survivor)  # of the engine's vertices
-    fitted = Refitted(placed, corners, np.arange(corners.size).reshape(corners.shape), np.zeros(0, np.int64))
+    fitted = Refitted.unfitted(placed, corners)
     if options.refit and options.moves and length:
         # the engine's vertices stand for the input's, so that seams stay closed
         fitted = refit(
@@ -104,13 +104,14 @@ def level(mesh: Prepared, record: CollapseRecord, original: Mesh, length: int,
             bound=None if carrier is None else carrier.bound(merged, len(placed)),
             group=_sheets(mesh, faces, face_map) if carrier is None else carrier.sheets(face_map),
             flips=options.flips and (carrier is None or carrier.flips), spare=spare,
-            apart=mesh.opened if carrier is None else mesh.opened | carrier.marked)
+            apart=mesh.opened if carrier is None else mesh.opened | carrier.marked,
+            lines=_line_edges(mesh, options, carrier))
     numbers = merged.copy()
     numbers[fitted.back] = len(placed) + np.arange(len(fitted.back))
     placed, corners, slots = fitted.vertices, fitted.faces, fitted.corner
     vertex_map = np.where(mesh.vertex >= 0, numbers.take(mesh.vertex, mode="clip"), -1)
     if carrier is not None:
-        carried = carrier.carry(placed, corners, face_map, merged, slots, fitted.back)
+        carried = carrier.carry(placed, corners, face_map, merged, fitted)
         messages = (*mesh.messages, *carrier.messages)
         return SimplifyResult(carried.points, carried.corners.astype(np.int32), carried.vertex_map.astype(np.int32),
                               carried.face_map.astype(np.int32), True, messages, record, original,
@@ -129,6 +130,12 @@ def spare_of(count: int, options: Options, carrier: Carrier | None) -> int:
     if not (options.refit and options.moves and options.flips) or (carrier is not None and not carrier.reinserts):
         return 0
     return spare_vertices(count)
+
+
+def _line_edges(mesh: Prepared, options: Options, carrier: Carrier | None) -> Ints:
+    """Return the engine's edges, (2, l) int64, that a refit follows: open boundaries and lines."""
+    boundary = mesh.boundary_edges[:, : 0 if options.boundary_lines == "ignored" else None]
+    return boundary if carrier is None else np.concatenate((boundary, carrier.line_edges), axis=1)
 
 
 def _sheets(mesh: Prepared, input_faces: Ints, face_map: Ints) -> Ints | None:

@@ -69,6 +69,15 @@ class Lines:
         """Return the vertices on lines of these kinds."""
         return np.unique(self.faces.ravel().take(self.pairs[:2].compress((self.kinds & bits) > 0, axis=1)))
 
+    def unbroken(self, layer: Layer, elements: Ints) -> Ints:
+        """Return corners, (2, k) int64 slots, that are joined across a line which a layer does not jump at.
+
+        The layer's elements, (3, m) int64, are those at the corners of the faces.
+        """
+        pairs = self.pairs.compress(self.kinds > 0, axis=1)
+        pairs = pairs.compress(~_jumps(layer, elements.ravel().take(pairs)), axis=1)
+        return np.concatenate((pairs[0::2], pairs[1::2]), axis=1)
+
     @cached_property
     def parted(self) -> Bools:
         """(n,) bool: vertices whose corners may be of several wedges."""

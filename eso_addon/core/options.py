@@ -102,7 +102,7 @@ class Options:
     material_lines: str = "kept"
     sharp_lines: str = "kept"
     boundary_lines: str = "kept"
-    line_weight: float = 3.0
+    line_weight: float = 5.0
     attribute_weight: float = 1.0
     locked: ArrayLike | None = None
     importance: ArrayLike | None = None

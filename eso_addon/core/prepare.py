@@ -51,6 +51,12 @@ class Prepared:
     turned: Bools | None
     messages: tuple[str, ...]
 
+    @property
+    def boundary_edges(self) -> Ints:
+        """The vertices of the sides without another face, (2, b) int64."""
+        faces = self.faces
+        return np.stack([rows.ravel().take(self.boundary) for rows in (faces, np.roll(faces, -1, axis=0))])
+
 
 def prepare(vertices: Floats, faces: Ints, *, join: bool = True, prune: float = 0.0) -> Prepared:
     """Make a mesh ready for the engine.

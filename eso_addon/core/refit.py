@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from .adjacency import boundary_vertices, sorting_order, stars
 from .closest import ClosestPoints, closest_in_triangles, squared_distances, triangle_frames
+from .curves import Curves
 from .flips import flip_edges
-from .least_squares import Samples, best_step
+from .least_squares import Meeting, Samples, best_step
 from .mesh import bounds
 from .normals import face_area_vectors, face_areas, face_normals, lengths
 from .reinsertion import reinsert, with_parts
@@ -27,6 +28,7 @@ _TURN = 0.5  # least cosine between a face's normals before and after
 _SHAPE = 0.5  # least area over squared edges afterwards, relative to before
 _HALVINGS = 3
 _SINGLE = 1e-5  # rounding of squared distances in single precision
+_NOTHING = 1e-7  # of a step that single precision may have made: straight borders along an axis stay straight
 _FAR = 9.0  # times the median squared distance
 _BLOCK = 8192
 
@@ -44,18 +46,30 @@ class Refitted(NamedTuple):
         face that it lies on.
     back : (c,) int64
         The original vertices that came back.
+    source : (s,) int64
+        Faces of the original whose centres are samples.
+    met : Meeting, optional
+        Where these lie nearest to the new faces; None if nothing was fitted.
     """
 
     vertices: Floats
     faces: Ints
     corner: Ints
     back: Ints
+    source: Ints
+    met: Meeting | None
+
+    @classmethod
+    def unfitted(cls, vertices: Floats, faces: Ints) -> Refitted:
+        """Return a mesh as it is."""
+        none = np.zeros(0, np.int64)
+        return cls(vertices, faces, np.arange(faces.size).reshape(faces.shape), none, none, None)
 
 
 def refit(vertices: Floats, faces: Ints, original_vertices: Floats, original_faces: Ints, *,
           vertex_map: Ints | None = None, fixed: Bools | None = None, bound: Bools | None = None,
           group: Ints | None = None, rounds: int = _ROUNDS, flips: bool = True, spare: int = 0,
-          apart: Bools | None = None) -> Refitted:
+          apart: Bools | None = None, lines: Ints | None = None) -> Refitted:
     """Fit a simplified mesh to its original by moving its vertices and flipping its edges.
 
     First the original vertices that are farthest from it come back, if any may. Each round finds the closest point on
@@ -72,7 +86,7 @@ def refit(vertices: Floats, faces: Ints, original_vertices: Floats, original_fac
     vertex_map : (n,) int64, optional
         The simplified vertex each original vertex was collapsed into, -1 if none: spares a search over the mesh.
     fixed : (k,) bool, optional
-        Vertices that must stay; boundary vertices always do.
+        Vertices that must stay; boundary vertices do too, unless they are on lines.
     bound, group : optional
         Edges that must stay: see `flips.flip_edges`.
     rounds : int
@@ -82,14 +96,19 @@ def refit(vertices: Floats, faces: Ints, original_vertices: Floats, original_fac
         Original vertices that may come back; each makes two more triangles.
     apart : (n,) bool, optional
         Original vertices that must not.
+    lines : (2, l) int64, optional
+        Edges of the original that the simplified mesh's must follow; needs `vertex_map`.
     """
     held = boundary_vertices(faces, len(vertices))
+    if lines is not None and vertex_map is not None:
+        ends = vertex_map.take(lines)
+        held[ends[ends >= 0]] = False
     if fixed is not None:
         held |= fixed
     flat = not face_area_vectors(original_vertices, original_faces).any()
     if len(faces) == 0 or rounds < 1 or flat or (held.all() and not flips):
-        return Refitted(vertices.copy(), faces, np.arange(faces.size).reshape(faces.shape), np.zeros(0, np.int64))
-    fit, center, size = _begun(vertices, faces, original_vertices, original_faces, vertex_map, held)
+        return Refitted.unfitted(vertices.copy(), faces)
+    fit, center, size = _begun(vertices, faces, original_vertices, original_faces, vertex_map, held, lines)
     fit.bound, fit.group = bound, group
     back = fit.reinsert(spare, apart)
     vertices = np.concatenate((vertices, original_vertices.take(back, axis=0)))
@@ -100,11 +119,11 @@ def refit(vertices: Floats, faces: Ints, original_vertices: Floats, original_fac
             fit.flip()
     moved = fit.vertices
     placed = np.where((moved == start).all(axis=1)[:, None], vertices, moved * size + center)
-    return Refitted(placed, fit.faces, fit.corner, back)
+    return Refitted(placed, fit.faces, fit.corner, back, fit.samples.face, fit.met())
 
 
 def _begun(vertices: Floats, faces: Ints, original_vertices: Floats, original_faces: Ints, vertex_map: Ints | None,
-           held: Bools) -> tuple[_Fit, Floats, float]:
+           held: Bools, lines: Ints | None) -> tuple[_Fit, Floats, float]:
     """Return what is fitted, in a frame of its own: about this centre, and of this size."""
     # unit size and the origin in the middle keep the precision of small parts of large scenes
     low, high = bounds(vertices)
@@ -113,7 +132,10 @@ def _begun(vertices: Floats, faces: Ints, original_vertices: Floats, original_fa
     samples, near = _samples((original_vertices - center) / size, original_faces, wanted)
     start = (vertices - center) / size
     face = _first_faces(start, faces, samples.points, None if vertex_map is None else vertex_map.take(near))
-    return _Fit(start, faces, samples, face, held), center, size
+    fit = _Fit(start, faces, samples, face, held)
+    if lines is not None and lines.size and vertex_map is not None:
+        fit.curves = Curves((original_vertices - center) / size, lines, vertex_map)
+    return fit, center, size
 
 
 def _samples(vertices: Floats, faces: Ints, wanted: int) -> tuple[Samples, Ints]:
@@ -134,7 +156,8 @@ def _samples(vertices: Floats, faces: Ints, wanted: int) -> tuple[Samples, Ints]
     normals = np.concatenate([np.zeros((len(pick), 3)), face_normals(vertices, corners)])
     exact = np.ascontiguousarray(np.concatenate([vertices[pick], centers]).T)
     # single precision decides which face is near: it takes half the time, and positions are solved in double
-    samples = Samples(exact, exact.astype(np.float32), weights / weights.mean(), np.ascontiguousarray(normals.T), pick)
+    samples = Samples(exact, exact.astype(np.float32), weights / weights.mean(), np.ascontiguousarray(normals.T), pick,
+                      middle)
     return samples, np.concatenate([pick, corners[:, 0]])
 
 
@@ -151,6 +174,7 @@ class _Fit:
         self.vertices, self.faces = vertices, faces
         self.corner = np.arange(faces.size).reshape(faces.shape)
         self.samples, self.face, self.held = samples, face, held
+        self.curves: Curves | None = None
         self.bound: Bools | None = None
         self.group: Ints | None = None
         self.fresh: Bools | None = None  # faces that the last flips made; edges of others were no better flipped
@@ -179,8 +203,9 @@ class _Fit:
     def move(self) -> None:
         """Move the vertices to where the samples pull them, but none that makes the worst sample worse."""
         now, faces = self.vertices, self.faces
-        step = best_step(now, faces, self.samples, self.face, _barycentric(now, faces, self.face, self.closest))
+        step = self._step()
         step[self.held] = 0
+        step[np.abs(step) < _NOTHING] = 0
         share, judged = np.ones(len(now)), np.arange(len(faces))
         for _ in range(2 * _HALVINGS):
             _hold_flips(now, step, share, faces, self.start, judged)
@@ -195,6 +220,28 @@ class _Fit:
             self.vertices = now
             self._look()
         self.worst = min(self.worst, float(self.squared.max()))
+
+    def _step(self) -> Floats:
+        """Return where the samples pull the vertices, and those of lines too: their edges are faces of no area."""
+        faces, samples, face, curves = self.faces, self.samples, self.face, self.curves
+        places = _barycentric(self.vertices, faces, face, self.closest)
+        if curves is not None and curves.exact.size:
+            edge, shares = curves.look(self.vertices)
+            heavy = curves.weights(float(face_areas(self.vertices, faces).sum()), len(faces)) * samples.weights.sum()
+            samples = samples._replace(
+                exact=np.concatenate((samples.exact, curves.exact), axis=1),
+                weights=np.concatenate((samples.weights, heavy)),
+                normals=np.concatenate((samples.normals, np.zeros_like(curves.exact)), axis=1))
+            face = np.concatenate((face, edge + len(faces)))
+            faces = np.concatenate((faces, curves.edges[[0, 1, 1]].T))
+            places = np.concatenate((places, np.concatenate((shares, np.zeros((1, len(edge)))))), axis=1)
+        return best_step(self.vertices, faces, samples, face, places)
+
+    def met(self) -> Meeting:
+        """Return where the samples that are centres of faces now lie."""
+        some = slice(len(self.samples.vertex), None)
+        places = _barycentric(self.vertices, self.faces, self.face[some], self.closest[:, some])
+        return Meeting(self.face[some], places, self.samples.weights[some])
 
     def reinsert(self, wanted: int, apart: Bools | None) -> Ints:
         """Make vertices of the farthest samples that are the original's vertices; return which of these."""

@@ -42,9 +42,8 @@ def initial_quadrics(mesh: Prepared, options: Options, blocks: Blocks, guidance:
         sides = mesh.boundary
         normals, areas = area_normals(mesh.points, mesh.faces)
         face = sides % mesh.faces.shape[1]
-        edges = np.stack((mesh.faces.ravel().take(sides), np.roll(mesh.faces, -1, axis=0).ravel().take(sides)))
         parts += boundary_quadrics(mesh.points, normals.take(face, axis=1) / np.maximum(areas.take(face), 1e-300),
-                                   edges, options.boundary_weight)
+                                   mesh.boundary_edges, options.boundary_weight)
     if guidance is not None and guidance.lines is not None and options.line_weight > 0:
         parts += line_quadrics(mesh.points, guidance.lines, options.line_weight)
     if options.method in ("so", "eso"):

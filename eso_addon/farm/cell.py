@@ -114,8 +114,8 @@ def cut_cell(folder: str, cell: int, count: int, fit: bool) -> dict[str, Any]:
         merged = np.where(used[survivor], number[survivor], -1)
         # no edge flips at a border: nobody knows whether the new one is there already on the other side
         group = np.where(held[corners].any(axis=1), np.arange(len(corners)) + 1, -turned.astype(np.int64))
-        placed, _, slots, _ = refit(placed, corners, data["points"], faces, vertex_map=merged, fixed=held, group=group)
-        corners = corners.ravel().take(slots)
+        fitted = refit(placed, corners, data["points"], faces, vertex_map=merged, fixed=held, group=group)
+        placed, corners = fitted.vertices, corners.ravel().take(fitted.corner)
     corners[turned, 1:] = corners[turned, :0:-1]
     for name, values in (("points", placed), ("corners", corners.astype(np.int32)), ("held", held)):
         np.save(place / f"{name}_{cell}.npy", values)

@@ -20,7 +20,7 @@ from .test_refit import Case, cases, nearest_vertex
 def refitted(case: Case, **options: object) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     vertices, faces, original, original_faces, guided = case
     near = nearest_vertex(vertices, original) if guided else None
-    moved, _, corner, _ = refit(vertices, faces, original, original_faces, vertex_map=near, **options)  # type: ignore[arg-type]
+    moved, _, corner, *_ = refit(vertices, faces, original, original_faces, vertex_map=near, **options)  # type: ignore[arg-type]
     return moved, faces.ravel().take(corner), corner
 
 
@@ -70,7 +70,7 @@ def test_a_wrong_diagonal_is_turned_into_the_ridge() -> None:
     original = np.column_stack([u, v, np.abs(u - v)])
     fine = np.concatenate([np.column_stack([a, b, c]), np.column_stack([a, c, d])])
     corners = np.array([[0.0, 0, 0], [1, 0, 1], [1, 1, 0], [0, 1, 1]])
-    moved, _, corner, _ = refit(corners, np.array([[0, 1, 3], [1, 2, 3]]), original, fine)
+    moved, _, corner, *_ = refit(corners, np.array([[0, 1, 3], [1, 2, 3]]), original, fine)
     faces = np.array([[0, 1, 3], [1, 2, 3]]).ravel().take(corner)
     assert {frozenset(face) for face in faces.tolist()} == {frozenset((0, 1, 2)), frozenset((0, 2, 3))}
     assert measure(original, fine, moved, faces, samples=1000).symmetric.maximum < 1e-6
