@@ -12,9 +12,10 @@ from .adjacency import boundary_vertices, sorting_order, stars
 from .closest import ClosestPoints, closest_in_triangles, squared_distances, triangle_frames
 from .curves import Curves
 from .flips import flip_edges
+from .guard import HALVINGS, halve, hold_flips
 from .least_squares import Meeting, Samples, best_step
 from .mesh import bounds
-from .normals import face_area_vectors, face_areas, face_normals, lengths
+from .normals import face_area_vectors, face_areas, face_normals
 from .reinsertion import reinsert, with_parts
 
 Bools = NDArray[np.bool_]
@@ -24,9 +25,6 @@ Ints = NDArray[np.int64]
 _ROUNDS = 5
 _PER_FACE = 10
 _LEAST = 5000  # and at least so many in all: they are soon done, and miss nothing of a small mesh
-_TURN = 0.5  # least cosine between a face's normals before and after
-_SHAPE = 0.5  # least area over squared edges afterwards, relative to before
-_HALVINGS = 3
 _SINGLE = 1e-5  # rounding of squared distances in single precision
 _NOTHING = 1e-7  # of a step that single precision may have made: straight borders along an axis stay straight
 _FAR = 9.0  # times the median squared distance
@@ -207,15 +205,15 @@ class _Fit:
         step[self.held] = 0
         step[np.abs(step) < _NOTHING] = 0
         share, judged = np.ones(len(now)), np.arange(len(faces))
-        for _ in range(2 * _HALVINGS):
-            _hold_flips(now, step, share, faces, self.start, judged)
+        for _ in range(2 * HALVINGS):
+            hold_flips(now, step, share, faces, self.start, judged)
             before, self.vertices = self.vertices, now + share[:, None] * step
             moved = (self.vertices != before).any(axis=1)
             self._look(self._beside(moved.take(faces).any(axis=1)))
             bad = self.squared > self.worst * (1 + _SINGLE)
             if not bad.any():
                 break
-            judged = _halve(share, faces, self.face[bad])
+            judged = halve(share, faces, self.face[bad])
         else:
             self.vertices = now
             self._look()
@@ -380,34 +378,3 @@ def _barycentric(vertices: Floats, faces: Ints, face: Ints, points: Floats) -> F
         third = (offset * local[6:]).sum(axis=0).clip(0, 1 - second)
         weights[:, part] = 1 - second - third, second, third
     return weights
-
-
-def _hold_flips(vertices: Floats, step: Floats, share: Floats, faces: Ints, start: Floats, judged: Ints) -> None:
-    """Halve the share of the step, and at last take none, around those faces that turn or get thin since the start.
-
-    The vertices themselves must hold no such face; the share changes in place.
-    """
-    while len(judged):
-        corners = faces.take(judged, axis=0)
-        moved: Floats = vertices + share[:, None] * step
-        before, after = face_area_vectors(start, corners), face_area_vectors(moved, corners)
-        size, area = lengths(before), lengths(after)
-        bad = np.einsum("ij,ij->i", before, after) < _TURN * size * area
-        bad |= area * _squared_sides(start, corners) < _SHAPE * size * _squared_sides(moved, corners)
-        bad &= share.take(corners).max(axis=1) > 0
-        judged = _halve(share, faces, judged[bad])
-
-
-def _halve(share: Floats, faces: Ints, bad: Ints) -> Ints:
-    """Halve the shares of these faces' corners, in place, and return the faces around them."""
-    corners = np.unique(faces.take(bad, axis=0))
-    share[corners] = np.where(share[corners] > 0.5**_HALVINGS, share[corners] / 2, 0)
-    touched = np.zeros(len(share), bool)
-    touched[corners] = True
-    return np.flatnonzero(touched.take(faces).any(axis=1))
-
-
-def _squared_sides(vertices: Floats, faces: Ints) -> Floats:
-    """Return the sum of each face's squared edges."""
-    a, b, c = (vertices.take(faces[:, corner], axis=0) for corner in range(3))
-    return ((b - a) ** 2).sum(axis=1) + ((c - b) ** 2).sum(axis=1) + ((a - c) ** 2).sum(axis=1)
