@@ -10,6 +10,7 @@ import numpy as np
 from .adjacency import components
 from .attributes import Layer
 from .carry import Places
+from .guard import halve
 from .least_squares import Equations, Meeting
 from .lines import Lines
 from .mesh import Bools, Floats, Ints
@@ -17,7 +18,6 @@ from .unflip import areas_of
 
 # what moves less than this, beside the layer's largest value, is rounding: equal values stay equal to the last bit
 _ROUNDING = 1e-7
-_HALVINGS = 3
 # a UV triangle keeps at least this part of its area
 _LEFT = 0.2
 
@@ -106,11 +106,10 @@ def _unit(columns: Floats) -> Floats:
 def without_turns(uv: Floats, step: Floats, faces: Ints) -> Floats:
     """Return the step, halved and at last left out around triangles that would turn over or lose most of their area."""
     before = areas_of(uv.T.take(faces, axis=0))
-    factor = np.ones(uv.shape[1])
-    while True:
-        after = areas_of((uv + factor * step).T.take(faces, axis=0))
-        bad = (after * np.sign(before) < _LEFT * np.abs(before)) & (factor.take(faces).max(axis=1) > 0)
-        if not bad.any():
-            return factor * step
-        around = faces[bad].ravel()
-        factor[around] = np.where(factor[around] > 0.5**_HALVINGS, factor[around] / 2, 0)
+    share, judged = np.ones(uv.shape[1]), np.arange(len(faces))
+    while len(judged):
+        corners, was = faces.take(judged, axis=0), before.take(judged)
+        after = areas_of((uv + share * step).T.take(corners, axis=0))
+        bad = (after * np.sign(was) < _LEFT * np.abs(was)) & (share.take(corners).max(axis=1) > 0)
+        judged = halve(share, faces, judged[bad])
+    return share * step
