@@ -59,7 +59,7 @@ export function makeStream(line, wish, show, tell) {
   /** Wait until something is said, or so many milliseconds. */
   const change = (milliseconds) => new Promise((resolve) => {
     waiting.add(resolve);
-    if (milliseconds) setTimeout(resolve, milliseconds);
+    if (milliseconds !== undefined) setTimeout(resolve, milliseconds); // also none: two clock readings may meet
   });
 
   async function run() {
