@@ -110,6 +110,25 @@ def test_pause_and_go_on(page: Page, site: Start) -> None:
     assert figures["received"] == figures["bytes"]
 
 
+# a clock that goes on by a step at each reading, and what was asked for within half a second of real time
+BUDGET_AT_STEP = """async (step) => {
+  const { makeStream } = await import('./stream.js');
+  let time = 0;
+  performance.now = () => (time += step);
+  const asked = [];
+  const line = { ranges: true, read: async function* (...span) { asked.push(span); await new Promise(() => {}); } };
+  makeStream(line, { budget: 2000, level: 1, cap: Infinity }, () => {}, () => {});
+  await new Promise((resolve) => setTimeout(resolve, 500));
+  return asked.length;
+}"""
+
+
+@pytest.mark.parametrize("parts", [1, 3, 4])
+def test_a_budget_that_is_full_at_the_second_look_is_not_waited_for(page: Page, site: Start, parts: int) -> None:
+    page.goto(site().url)
+    assert page.evaluate(BUDGET_AT_STEP, 512 / parts) > 0
+
+
 def test_an_error_on_screen_is_enough(page: Page, site: Start) -> None:
     page.goto(f"{site().url}?error=16")
     figures = until(page, "s.waiting && s.pixels > 0")
