@@ -56,6 +56,7 @@ def read_stream_mesh(mesh: bpy.types.Mesh, obj: bpy.types.Object, *, keep_order:
     mesh : bpy.types.Mesh
         Stored or evaluated.
     obj : bpy.types.Object
+        What shows it, or as it is evaluated: geometry nodes may bring vertex groups.
     keep_order : bool
         Tell which corner of each polygon is its first.
     """

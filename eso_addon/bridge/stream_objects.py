@@ -70,12 +70,14 @@ def read_objects(objects: Sequence[bpy.types.Object], *, apply_modifiers: bool =
 
 def _read(obj: bpy.types.Object, *, changed: bool, keep_order: bool) -> StreamMesh:
     shown: AbstractContextManager[bpy.types.Mesh]
+    owner = obj
     if changed:
-        shown = evaluated_mesh(obj, bpy.context.evaluated_depsgraph_get())
+        depsgraph = bpy.context.evaluated_depsgraph_get()
+        shown, owner = evaluated_mesh(obj, depsgraph), obj.evaluated_get(depsgraph)
     else:
         shown = stored_mesh(obj) if obj.data.is_editmode else nullcontext(obj.data)
     with shown as mesh:
-        result = read_stream_mesh(mesh, obj, keep_order=keep_order)
+        result = read_stream_mesh(mesh, owner, keep_order=keep_order)
     result.meta["name"] = obj.data.name
     if not changed:
         read_keys(result, obj.data)

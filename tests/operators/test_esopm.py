@@ -11,6 +11,8 @@ import pytest
 from eso_addon.bridge.attributes import ATTRIBUTE_TYPES, read_attribute
 from tests.bridge.blender_scenes import activate, add_cube, add_mesh, add_sphere
 
+from .test_carrying import check_joined, joined_by_nodes
+
 pytestmark = pytest.mark.usefixtures("addon")
 # what Blender makes anew, and what is of the editors
 _PASSING = (".corner_edge", ".edge_verts", ".select_", ".hide_", ".uv_select_")
@@ -190,6 +192,11 @@ def test_modifiers_are_applied_or_not(tmp_path: Path) -> None:
     activate(obj)
     path = exported(tmp_path / "b.esopm", apply_modifiers=False, use_selection=True)
     assert len(imported(path)[0].data.polygons) == 6
+
+
+def test_groups_that_geometry_nodes_bring_keep_their_names(tmp_path: Path) -> None:
+    joined_by_nodes()
+    check_joined(imported(exported(tmp_path / "joined.esopm", use_selection=True))[0])
 
 
 def test_bad_input_is_one_error(tmp_path: Path) -> None:
