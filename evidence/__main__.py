@@ -57,6 +57,7 @@ def main(words: Sequence[str] | None = None) -> int:
 
     status = run(told.models and Path(told.models), told.out, say, short=told.short)
     if told.docs:
+        told.docs.mkdir(parents=True, exist_ok=True)
         shutil.copy(told.out / "papers.md", told.docs)
         shutil.copytree(told.out / "images", told.docs / "images", dirs_exist_ok=True)
     return status

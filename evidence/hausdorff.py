@@ -37,7 +37,7 @@ class Distances:
         return max(self.forward_mean, self.backward_mean)
 
 
-def distances(original: Path, files: Sequence[str], timeout: float = 600.0) -> list[Distances]:
+def distances(original: Path, files: Sequence[str], timeout: float = 1800.0) -> list[Distances]:
     """Measure simplified meshes against their original; a maximum is over samples of vertices, edges and faces.
 
     A mean is over samples of faces alone, which are spread evenly over the area.
