@@ -70,8 +70,8 @@ class Carrier:
         self._points = np.ascontiguousarray(original[0].take(mesh.source, axis=0).T)
         self._ground: Ground | None = None
         self._vertex = faces.ravel().take(lines.corner)  # the input's vertex at each corner
-        self._locked, self._held = locked, locked.copy()
-        self._held[lines.edges] = True
+        self._locked, self._lined = locked, locked.copy()  # the second: or on lines
+        self._lined[lines.edges] = True
         self.messages = (*attributes.messages, *lines.messages)
 
     def held(self, survivor: Ints, count: int) -> Bools:
@@ -108,7 +108,7 @@ class Carrier:
     @cached_property
     def marked(self) -> Bools:
         """The engine's vertices, (n,) bool, on lines, locked, or at an edge that carries a value."""
-        marked = self._held.copy()
+        marked = self._lined.copy()
         for layer in self._own.on("edge"):
             ends = self._mesh.vertex.take(self._own.edges[(layer.rows != 0).any(axis=1)])
             marked[ends[ends >= 0]] = True
@@ -227,7 +227,7 @@ class Carrier:
         uv = np.zeros((len(places.vertex), 2))
         uv[faces.ravel()] = values
         lined = np.zeros(there.shape[1], bool)
-        lined[places.vertex.take(places.target.ravel().compress(self._held.take(self._lines.faces.ravel())))] = True
+        lined[places.vertex.take(places.target.ravel().compress(self._lined.take(self._lines.faces.ravel())))] = True
         mended, still = turned_back(uv, faces, turns, ~lined.take(places.vertex))
         moved = (mended != uv).any(axis=1).take(faces.ravel())
         values[moved] = mended.take(faces.ravel()[moved], axis=0)

@@ -134,7 +134,7 @@ def spare_of(count: int, options: Options, carrier: Carrier | None) -> int:
 
 def _line_edges(mesh: Prepared, options: Options, carrier: Carrier | None) -> Ints:
     """Return the engine's edges, (2, l) int64, that a refit follows: open boundaries and lines."""
-    boundary = mesh.boundary_edges[:, : 0 if options.boundary_lines == "ignored" else None]
+    boundary = np.zeros((2, 0), np.int64) if options.boundary_lines == "ignored" else mesh.boundary_edges
     return boundary if carrier is None else np.concatenate((boundary, carrier.line_edges), axis=1)
 
 
