@@ -9,6 +9,7 @@ from typing import Any
 import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator
 
 mpl.use("Agg")
 mpl.rcParams.update({
@@ -34,6 +35,13 @@ def axes_row(count: int, width: float = 4.2, height: float = 3.4) -> tuple[Figur
     for spare in every[count:]:
         spare.remove()
     return figure, every[:count]
+
+
+def count_axis(axes: Axes) -> None:
+    """Put plain numbers, far enough apart, under a logarithmic axis of counts."""
+    axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    axes.xaxis.set_major_formatter("{x:,.0f}")
+    axes.xaxis.set_minor_formatter("")
 
 
 def line(axes: Axes, x: Sequence[float], y: Sequence[float], label: str, *, printed: bool = False,

@@ -6,13 +6,14 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from benchmarks.readers import Mesh
 
 from .context import Context
 from .models import subdivided
 from .page import Pictures, Plot, Section, Table
-from .plots import axes_row, line
+from .plots import axes_row, count_axis, line
 from .printed import QEM_FACES
 from .raster import Camera, render
 from .streams import Subject, subjects
@@ -42,9 +43,16 @@ def levels_section(context: Context) -> Section:
             part.problems.append(f"{name}: {type(rows).__name__}: {rows}")
         else:
             part.raw += rows
+    part.blocks.append(Plot("Figures 8 and 9: the levels against the original; lower is closer.", _curves(part.raw)))
+    part.blocks.append(_verdict(part.raw))
+    return part
+
+
+def _curves(rows: list[dict[str, Any]]) -> Figure:
+    """Draw Figures 8 and 9."""
     figure, (left, right) = axes_row(2, width=5.4, height=4.0)
     for name in METHODS:
-        mine = [row for row in part.raw if row["method"] == name]
+        mine = [row for row in rows if row["method"] == name]
         if mine:
             faces = [row["faces"] for row in mine]
             line(left, faces, [row["squared"] for row in mine], name)
@@ -53,11 +61,10 @@ def levels_section(context: Context) -> Section:
              title="Figure 8: geometry")
     right.set(xlabel="triangles of the level", ylabel="difference of pictures (grey levels)", xscale="log",
               title="Figure 9: appearance")
-    left.legend()
-    right.legend()
-    part.blocks.append(Plot("Figures 8 and 9: the levels against the original; lower is closer.", figure))
-    part.blocks.append(_verdict(part.raw))
-    return part
+    for axes in (left, right):
+        count_axis(axes)
+        axes.legend()
+    return figure
 
 
 def curve(path: Any, name: str, steps: int) -> list[dict[str, Any]]:  # noqa: ANN401
