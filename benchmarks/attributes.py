@@ -13,6 +13,7 @@ from typing import Any
 import bpy
 import numpy as np
 
+from eso_addon.bridge.nodes import use_nodes
 from eso_addon.bridge.read_mesh import MeshArrays, read_mesh
 from eso_addon.bridge.scene_files import READERS
 from eso_addon.bridge.write_mesh import write_mesh
@@ -128,10 +129,10 @@ def _give_texture(path: Path) -> None:
     """Put a texture on a model whose file names none."""
     if path.name in TEXTURES:
         material = bpy.data.materials.new("Texture")
-        material.use_nodes = True
-        node = material.node_tree.nodes.new("ShaderNodeTexImage")
+        tree = use_nodes(material)
+        node = tree.nodes.new("ShaderNodeTexImage")
         node.image = bpy.data.images.load(str(path.with_name(TEXTURES[path.name])))
-        material.node_tree.links.new(node.outputs[0], material.node_tree.nodes["Principled BSDF"].inputs[0])
+        tree.links.new(node.outputs[0], tree.nodes["Principled BSDF"].inputs[0])
         for obj in bpy.context.scene.objects:
             if obj.type == "MESH":
                 obj.data.materials.clear()

@@ -8,6 +8,7 @@ import bpy
 import numpy as np
 
 from ..core.mesh import MeshError
+from .nodes import use_nodes
 from .staging import staged
 
 _NODE = "ESO LOD Normals"  # finds the nodes again when a map is baked anew
@@ -118,8 +119,7 @@ def _own_materials(level: bpy.types.Object, image: bpy.types.Image) -> list[bpy.
 def _copied(material: bpy.types.Material | None, level: bpy.types.Object) -> bpy.types.Material:
     copy = bpy.data.materials.new(level.name) if material is None else material.copy()
     copy.name = f"{level.name if material is None else material.name}_{level.name}"
-    if bpy.app.version < (5, 0):  # later ones always use nodes, and do not want to be asked
-        copy.use_nodes = True
+    use_nodes(copy)
     return copy
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from mathutils import Euler
 
 from ..files.atomic import atomic_output
+from .nodes import use_nodes
 from .quiet import quiet
 from .scene_files import world_triangles
 
@@ -89,8 +90,7 @@ def _add(scene: bpy.types.Scene, triangles: tuple[np.ndarray, np.ndarray] | None
 def _material(name: str, color: tuple[float, float, float], glow: float) -> bpy.types.Material:
     """Make a matt material, or one that has its colour in any light."""
     material = bpy.data.materials.new(name)
-    material.use_nodes = True
-    tree = material.node_tree
+    tree = use_nodes(material)
     tree.nodes.clear()
     shader = tree.nodes.new("ShaderNodeEmission" if glow else "ShaderNodeBsdfDiffuse")
     shader.inputs["Color"].default_value = (*color, 1)
@@ -112,9 +112,9 @@ def _set_up(scene: bpy.types.Scene, width: float, height: float) -> None:
     obj.rotation_euler = (radians(38), radians(-28), 0)
     scene.collection.objects.link(obj)
     world = bpy.data.worlds.new("Paper")
-    world.use_nodes = True
-    world.node_tree.nodes["Background"].inputs["Color"].default_value = (0.9, 0.91, 0.93, 1)
-    world.node_tree.nodes["Background"].inputs["Strength"].default_value = 0.8
+    background = use_nodes(world).nodes["Background"]
+    background.inputs["Color"].default_value = (0.9, 0.91, 0.93, 1)
+    background.inputs["Strength"].default_value = 0.8
     scene.world = world
     scene.render.engine = "CYCLES"
     scene.render.resolution_x, scene.render.resolution_y = round(width * _CELL), round(height * _CELL)

@@ -16,6 +16,7 @@ from ..core.mesh import MeshError
 from ..core.steps import scaled
 from ..progressive.progressive import Level, progressive_steps
 from ..progressive.scene import Scene, load_scene
+from .nodes import use_nodes
 from .read_mesh import evaluated_mesh, stored_mesh
 from .stream_mesh import StreamMesh, read_keys, read_stream_mesh, write_owned, write_stream_mesh
 
@@ -209,8 +210,7 @@ def _material(entry: Any) -> bpy.types.Material | None:  # noqa: ANN401 - from a
     color = entry.get("color")
     if isinstance(color, list) and len(color) == 4 and all(isinstance(value, (int, float)) for value in color):
         material.diffuse_color = color
-        if bpy.app.version < (5, 0, 0):  # later all have nodes
-            material.use_nodes = True
+        use_nodes(material)
         shader = _principled(material)
         if shader is not None:
             shader.inputs["Base Color"].default_value = color

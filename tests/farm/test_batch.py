@@ -214,6 +214,7 @@ def test_what_becomes_of_a_child(child: str, tmp_path: Path, do: str, told: str,
 
 def test_textures_of_two_models_in_a_folder(tmp_path: Path) -> None:
     bpy = pytest.importorskip("bpy")
+    from eso_addon.bridge.nodes import use_nodes
     from eso_addon.bridge.scene_files import start_empty
 
     (tmp_path / "in").mkdir()
@@ -224,11 +225,11 @@ def test_textures_of_two_models_in_a_folder(tmp_path: Path) -> None:
         image.pixels = colour * 16
         image.pack()
         material = bpy.data.materials.new("skin")
-        material.use_nodes = True
-        node = material.node_tree.nodes.new("ShaderNodeTexImage")
+        tree = use_nodes(material)
+        node = tree.nodes.new("ShaderNodeTexImage")
         node.image = image
-        shader = material.node_tree.nodes["Principled BSDF"]
-        material.node_tree.links.new(node.outputs["Color"], shader.inputs["Base Color"])
+        shader = tree.nodes["Principled BSDF"]
+        tree.links.new(node.outputs["Color"], shader.inputs["Base Color"])
         bpy.context.object.data.materials.append(material)
         bpy.ops.export_scene.gltf(filepath=str(tmp_path / f"in/{name}.glb"))
     assert batch(tmp_path / "in", tmp_path / "out", "--ratios", "0.5", "--format", ".gltf", "--workers", 1) == 0

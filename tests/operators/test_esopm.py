@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from eso_addon.bridge.attributes import ATTRIBUTE_TYPES, read_attribute
+from eso_addon.bridge.nodes import use_nodes
 from tests.bridge.blender_scenes import activate, add_cube, add_mesh, add_sphere
 
 from .test_carrying import check_joined, joined_by_nodes
@@ -19,10 +20,8 @@ _PASSING = (".corner_edge", ".edge_verts", ".select_", ".hide_", ".uv_select_")
 
 
 def paint(material: bpy.types.Material, color: tuple) -> None:
-    if bpy.app.version < (5, 0, 0):
-        material.use_nodes = True
     material.diffuse_color = color
-    material.node_tree.nodes["Principled BSDF"].inputs["Base Color"].default_value = color
+    use_nodes(material).nodes["Principled BSDF"].inputs["Base Color"].default_value = color
 
 
 def rich_monkey() -> bpy.types.Object:
