@@ -15,6 +15,7 @@ from eso_addon.bridge.stream_objects import read_objects, stream_steps
 from eso_addon.core.chains import Chain, Level
 from eso_addon.core.screen import Screen
 from eso_addon.core.steps import run_to_end
+from eso_addon.files.off import write_off
 from eso_addon.settings.profiles import PROFILES
 
 from .meshes import Mesh, decimate, sample_mesh
@@ -40,6 +41,7 @@ def main() -> int:
     (OUT / "table.md").write_text(table, encoding="utf-8")
     print("\nDeviations relative to the diagonal of the bounding box:\n\n" + table)
 
+    write_off(OUT / "cow.off", vertices, faces)
     stream = OUT / "cow.esopm"
     cow.objects[0].rotation_euler.x = math.pi / 2  # the file has Y up, a scene Z
     bpy.context.view_layer.update()
@@ -56,7 +58,7 @@ def main() -> int:
     pictures += [(f"{len(level.faces)} triangles", obj.data) for level, obj in zip(levels, made, strict=True)]
     with quiet("cannot render the contact sheet"):
         contact_sheet(OUT / "contact_sheet.png", pictures)
-    for path in (*written, stream, OUT / "table.md", OUT / "contact_sheet.png"):
+    for path in (OUT / "cow.off", *written, stream, OUT / "table.md", OUT / "contact_sheet.png"):
         print(path)
     return 0
 

@@ -6,9 +6,11 @@ import json
 import sys
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
+from . import __version__
 from .cli_batch import add_word as add_batch
 from .cli_large import add_options as add_large_options
 from .cli_large import is_large, simplify_file
@@ -139,6 +141,7 @@ def _refuse(message: str) -> int:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="eso_lod", description="Lighter meshes that keep their shape and features.")
+    parser.add_argument("--version", action="version", version=f"%(prog)s {__version__}")
     words = parser.add_subparsers(required=True, metavar="WORD")
     simplify = _add_word(words, "simplify", _simplify, "write a mesh with fewer triangles", "IN", "OUT")
     targets = simplify.add_mutually_exclusive_group(required=True)
@@ -229,8 +232,10 @@ def _number(word: str, is_valid: Callable[[float], bool], wanted: str) -> float:
 
 
 def _simplify(args: argparse.Namespace) -> None:
+    from .files.atomic import check_place
     from .settings.lod_record import LodSettings
 
+    check_place(args.output, args.json)
     options = _engine_options(args)
     if args.epsilon is not None and options.setdefault("method", "feature") != "feature":
         raise ValueError("--epsilon belongs to --method feature: leave out one of them")
@@ -246,7 +251,9 @@ def _simplify(args: argparse.Namespace) -> None:
     else:
         kind, value = _target({"ratio": args.ratio, "budget": args.faces, "error": args.max_error})
         chains = make_chains(model, LodSettings(kind, [value], {}, options, True, [], ""))
-        results = [chain.levels[0].result for chain in chains]
+        results = [replace(chain.levels[0].result, messages=chain.messages) for chain in chains]
+        if kind == "budget" and value < sum(len(one.faces) * times for one, times in zip(results, model.copies)):
+            results = [replace(one, reached=False) for one in results]
     seconds = time.perf_counter() - started
     written = model.write_simplified(args.output, results)
     _report(args, model, results, seconds, written)
@@ -264,6 +271,9 @@ def _simplify_to_epsilon(part: "Part", options: dict[str, Any]) -> "SimplifyResu
 
 def run_lod(args: argparse.Namespace) -> None:
     """Write the levels of one file."""
+    from .files.atomic import check_place
+
+    check_place(args.output, args.json)
     lod(args, _open, _engine_options(args))
 
 
@@ -283,13 +293,9 @@ def _open(source: Path, target: Path) -> Model:
 
 
 def _scene_files() -> Any:  # noqa: ANN401 - a module
-    from .bridge.quiet import quiet
+    from .bridge.quiet import need_blender
 
-    try:
-        with quiet("cannot start Blender"):
-            import bpy  # noqa: F401 - only whether it is there
-    except ImportError as error:
-        raise ValueError(f"only .off files work without Blender's module: pip install bpy ({error})") from None
+    need_blender()
     from .bridge import scene_files
 
     return scene_files
@@ -309,7 +315,9 @@ def _report(
 
 def _measure(args: argparse.Namespace) -> None:
     from .core.deviation import measure
+    from .files.atomic import check_place
 
+    check_place(args.json)
     deviation = measure(*_triangles(args.input), *_triangles(args.output))
     rows = {
         f"{args.input.name} to {args.output.name}": deviation.forward,

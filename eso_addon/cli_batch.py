@@ -73,7 +73,8 @@ def _seconds(word: str) -> float:
 
 def run(args: argparse.Namespace, formats: Sequence[str]) -> None:
     """Work off a library, or tell what is done of it."""
-    from .farm.ledger import Ledger, sole_run
+    from .farm.ledger import NAME, Ledger, sole_run
+    from .farm.library import check_folders
 
     wanted = any(getattr(args, name) for name in _TARGETS)
     if args.output is None:
@@ -83,13 +84,12 @@ def run(args: argparse.Namespace, formats: Sequence[str]) -> None:
     if not wanted and not args.report:
         raise ValueError("say what the levels are to be: --ratios, --faces, --errors or --sizes (or --report alone)")
     if not wanted:
-        if not args.output.is_dir():
-            raise ValueError(f"{args.output} is no folder: give that of a batch's results")
+        if not (args.output / NAME).is_file():
+            raise ValueError(f"{args.output} is no folder of a batch's results: it has no {NAME}")
         with closing(Ledger(args.output)) as ledger:
             _tell(args.output, ledger.rows())
         return
-    if not args.input.is_dir():
-        raise ValueError(f"{args.input} is no folder: give that of the meshes")
+    check_folders(args.input, args.output)
     args.output.mkdir(parents=True, exist_ok=True)
     with sole_run(args.output), closing(Ledger(args.output.resolve())) as ledger:
         _run(args, formats, ledger)

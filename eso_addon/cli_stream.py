@@ -80,6 +80,9 @@ def _epsilon(word: str) -> float:
 
 
 def _stream(args: argparse.Namespace) -> None:
+    from .files.atomic import check_place
+
+    check_place(args.output)
     if args.epsilon is not None and args.method not in (None, "feature"):
         raise ValueError("--epsilon belongs to the method feature: leave out one of them")
     options = {} if args.method is None else {"method": args.method}
@@ -127,6 +130,9 @@ def _read_off(path: Path, _keep_order: bool) -> tuple[Callable[[dict[str, Any]],
 
 def _read_scene(path: Path, keep_order: bool) -> tuple[Callable[[dict[str, Any]], Scene], list[str]]:
     """Read a file through Blender."""
+    from .bridge.quiet import need_blender
+
+    need_blender()
     from .bridge.stream_files import read_stream_objects
     from .bridge.stream_objects import stream_steps
     from .core.steps import run_to_end
@@ -141,13 +147,18 @@ def _read_scene(path: Path, keep_order: bool) -> tuple[Callable[[dict[str, Any]]
 
 
 def _restore(args: argparse.Namespace) -> None:
+    from .files.atomic import check_place
     from .progressive.scene import load_scene
 
+    check_place(args.output)
     scene = load_scene(args.input, partial=args.partial, max_bytes=args.bytes)
     levels = scene.levels(faces=args.faces)
     if args.output.suffix.lower() == ".off":
         _write_off(args.output, scene, levels)
     else:
+        from .bridge.quiet import need_blender
+
+        need_blender()
         from .bridge.stream_files import write_levels
 
         write_levels(args.output, scene, levels)

@@ -64,11 +64,14 @@ def test_off_to_off_needs_no_blender(ball: Path, tmp_path: Path) -> None:
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
     assert len(read_off(tmp_path / "small.off")[1]) == 200
-    command[-3] = str(tmp_path / "small.obj")
-    refused = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
-    assert refused.returncode == 1
-    assert "pip install bpy" in refused.stderr
-    assert refused.stderr.count("\n") == 1
+    assert main(["stream", str(ball), str(tmp_path / "ball.esopm")]) == 0
+    for refused in (["simplify", ball, tmp_path / "small.obj", "--faces", "200"],
+                    ["restore", tmp_path / "ball.esopm", tmp_path / "back.ply"],
+                    ["stream", tmp_path / "ball.ply", tmp_path / "other.esopm"]):
+        done = subprocess.run([*command[:3], *map(str, refused)], cwd=ROOT, capture_output=True, text=True, check=False)
+        assert done.returncode == 1
+        assert "pip install bpy" in done.stderr
+        assert done.stderr.count("\n") == 1
 
 
 def test_the_module_keeps_its_output_clean(ball: Path, tmp_path: Path) -> None:
@@ -254,6 +257,44 @@ def test_bad_meshes_are_one_line(text: str, words: str, tmp_path: Path, capsys: 
     assert words in err
     assert err.count("\n") == 1
     assert not (tmp_path / "out.off").exists()
+
+
+@pytest.mark.parametrize("words", [
+    ["simplify", "ball.off", "no/out.off", "--ratio", "0.5"], ["lod", "ball.off", "no/out.off", "--ratios", "0.5"],
+    ["simplify", "ball.off", "out.off", "--ratio", "0.5", "--json", "no/figures.json"],
+    ["lod", "ball.off", "out.off", "--ratios", "0.5", "--json", "no/figures.json"],
+    ["measure", "ball.off", "ball.off", "--json", "no/figures.json"],
+    ["stream", "ball.off", "no/out.esopm"], ["restore", "ball.esopm", "no/out.off"],
+])
+def test_places_are_looked_at_before_the_work(words: list[str], ball: Path, monkeypatch: pytest.MonkeyPatch,
+                                              capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.chdir(ball.parent)
+    assert run(*words) == 1
+    out, err = capsys.readouterr()
+    assert "no does not exist" in err
+    assert out == ""
+    assert [path.name for path in ball.parent.iterdir()] == ["ball.off"]
+
+
+def test_a_count_that_is_out_of_reach_is_told(ball: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["simplify", ball, tmp_path / "out.off", "--json", tmp_path / "out.json"]
+    assert run(*words, "--faces", 1) == 0
+    assert "of 1 triangles in all" in capsys.readouterr().out
+    told = json.loads((tmp_path / "out.json").read_text())["meshes"][0]
+    assert not told["reached"]
+    assert told["messages"]
+    assert run(*words, "--faces", 100) == 0
+    assert json.loads((tmp_path / "out.json").read_text())["meshes"][0]["reached"]
+
+
+def test_any_error_is_enough(ball: Path, tmp_path: Path) -> None:
+    assert run("simplify", ball, tmp_path / "out.off", "--max-error", "1e300") == 0
+    assert len(read_off(tmp_path / "out.off")[1]) < 100
+
+
+def test_version(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("--version") == 0
+    assert capsys.readouterr().out.startswith("eso_lod 0.")
 
 
 def test_the_target_cannot_be_written(ball: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

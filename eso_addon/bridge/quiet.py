@@ -36,6 +36,21 @@ def quiet(trouble: str) -> Iterator[None]:
         os.close(silent)
 
 
+def need_blender() -> None:
+    """Start Blender's module, quietly.
+
+    Raises
+    ------
+    ValueError
+        It is not there.
+    """
+    try:
+        with quiet("cannot start Blender"):
+            import bpy  # noqa: F401 - only whether it is there
+    except ImportError as error:
+        raise ValueError(f"only .off files work without Blender's module: pip install bpy ({error})") from None
+
+
 def _flush() -> None:
     """Empty Python's and C's buffers, so that nothing comes out late."""
     sys.stdout.flush()

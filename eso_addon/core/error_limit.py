@@ -128,7 +128,7 @@ class _Search:
         faces = faces[face_areas(vertices, faces) > 0]
         if len(faces) == 0:
             return np.inf
-        end = (_SAFE * self.limit) ** 2
+        end = (_SAFE * min(self.limit, 1e150)) ** 2  # of a longer one there is no square
         there, back = ClosestPoints(vertices, faces), self.probes.surface
         corners = vertices.take(np.unique(faces), axis=0)
         worst = 0.0

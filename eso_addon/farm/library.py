@@ -64,19 +64,32 @@ def list_library(folder: Path, output: Path, endings: Sequence[str], ending: str
     Raises
     ------
     ValueError
-        The output would lie among the sources.
+        As `check_folders`.
     OSError
         The folder cannot be read.
     """
+    check_folders(folder, output)
     folder, output = folder.resolve(), output.resolve()
-    if folder == output or folder.is_relative_to(output):
-        raise ValueError(f"{output} holds the files themselves: give another folder for the levels")
-    if not folder.is_dir():
-        raise NotADirectoryError(f"{folder} is no folder: give the folder that the meshes are in")
     places = sorted(_walk(folder, output, endings), key=lambda place: place[0].as_posix())
     targets = _targets([path for path, _ in places], ending)
     return [_entry(folder, path, output / target, trouble)
             for (path, trouble), target in zip(places, targets, strict=True)]
+
+
+def check_folders(folder: Path, output: Path) -> None:
+    """Refuse folders that are none.
+
+    Raises
+    ------
+    ValueError
+        One is something else, or the output would lie among the sources.
+    """
+    if not folder.is_dir():
+        raise ValueError(f"{folder} is no folder: give that of the meshes")
+    if output.exists() and not output.is_dir():
+        raise ValueError(f"{output} is a file: give a folder for the levels")
+    if folder.resolve().is_relative_to(output.resolve()):
+        raise ValueError(f"{output} holds the files themselves: give another folder for the levels")
 
 
 def sweep(output: Path) -> None:

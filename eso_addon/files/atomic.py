@@ -27,19 +27,19 @@ def atomic_output(target: str | os.PathLike[str]) -> Iterator[Path]:
     Raises
     ------
     OSError
-        If the target's folder does not exist, the target is a folder, or nothing was written.
+        If the target's folder does not exist or cannot be written in, the target is a folder, or nothing was written.
 
     Notes
     -----
     After an exception the temporary folder is gone and the target is as it was.
     """
+    check_place(target)
     target = Path(target).absolute()
-    if not target.parent.is_dir():
-        raise FileNotFoundError(f"cannot write {target.name}: the folder {target.parent} does not exist")
-    if target.is_dir():
-        raise IsADirectoryError(f"cannot write {target}: it is a folder; give the name of a file")
     # The temporary folder is a sibling of the target because a replacement is one step only within a file system.
-    folder = Path(tempfile.mkdtemp(prefix=".eso_lod_", dir=target.parent))
+    try:
+        folder = Path(tempfile.mkdtemp(prefix=".eso_lod_", dir=target.parent))
+    except OSError as error:
+        raise OSError(f"cannot write {target.name} in {target.parent}: {error.strerror}; give another folder") from None
     try:
         draft = folder / target.name
         yield draft
@@ -52,3 +52,18 @@ def atomic_output(target: str | os.PathLike[str]) -> Iterator[Path]:
         os.replace(draft, target)
     finally:
         shutil.rmtree(folder, ignore_errors=True)
+
+
+def check_place(*targets: str | os.PathLike[str] | None) -> None:
+    """Refuse a file in a folder that does not exist, or with the name of a folder: before the work, not after it.
+
+    Raises
+    ------
+    OSError
+        What is wrong with the first of them that cannot be written.
+    """
+    for target in (Path(target).absolute() for target in targets if target is not None):
+        if not target.parent.is_dir():
+            raise FileNotFoundError(f"cannot write {target.name}: the folder {target.parent} does not exist")
+        if target.is_dir():
+            raise IsADirectoryError(f"cannot write {target}: it is a folder; give the name of a file")

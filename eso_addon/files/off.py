@@ -40,7 +40,7 @@ def read_off(path: str | os.PathLike[str]) -> tuple[NDArray[np.float64], NDArray
         If the file cannot be opened.
     """
     name = Path(path).name
-    body, counts = _split_header(_without_comments(Path(path).read_bytes()), name)
+    body, counts = _split_header(_without_comments(Path(path).read_bytes().removeprefix(b"\xef\xbb\xbf")), name)
     line_starts, tokens = _tokens(body, name)
     vertex_count, face_count = counts
     if len(line_starts) >= vertex_count + face_count:

@@ -288,7 +288,8 @@ def test_odd_places(tmp_path: Path) -> None:
     (["in", "out", "--ratios", "0.5", "--workers", "0"], 2, "workers"),
     (["in", "out", "--ratios", "0.5", "--memory-limit", "x"], 2, "memory"),
     (["in", "out", "--ratios", "0.5", "--timeout", "0"], 2, "time"),
-    (["no", "--report"], 1, "no folder"),
+    (["no", "--report"], 1, "no folder"), (["in", "--report"], 1, "no ledger.sqlite"),
+    (["in", "in/a.off", "--ratios", "0.5"], 1, "is a file"),
     (["in", "out", "--ratios", "0.5", "--scheduler", "tcp://127.0.0.1:1"], 1, "scheduler"),
 ])
 def test_wrong_words(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
@@ -299,6 +300,7 @@ def test_wrong_words(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: py
     ball(tmp_path / "in/a.off")
     assert main(["batch", *words]) == code
     assert told in capsys.readouterr().err
+    assert [path.name for path in (tmp_path / "in").iterdir()] == ["a.off"]
 
 
 def test_without_dask_a_line_says_what_to_install(library: Path, tmp_path: Path) -> None:

@@ -55,3 +55,13 @@ def test_bad_targets(tmp_path: Path) -> None:
         pass
     with pytest.raises(IsADirectoryError, match="is a folder"), atomic_output(tmp_path):
         pass
+
+
+def test_a_folder_that_takes_no_files_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(**_: object) -> str:
+        raise PermissionError(13, "Permission denied", "/somewhere/.eso_lod_x")
+
+    monkeypatch.setattr("tempfile.mkdtemp", refuse)
+    with pytest.raises(OSError, match=r"cannot write mesh\.obj in .*: Permission denied; give another folder$"), \
+            atomic_output(tmp_path / "mesh.obj"):
+        pass

@@ -41,6 +41,7 @@ def test_what_is_written_reads_back_bit_for_bit(data: st.DataObject) -> None:
         f"off 4 1 4\n{SQUARE}4 0 1 2 3",
         f"4 1 0\n{SQUARE}4 0 1 2 3\n",
         f"OFF # a comment\n# another\n\n4 1 0\n\n{SQUARE}\n# faces\n4 0 1 2 3\n",
+        f"\ufeffOFF\n4 1 0\n{SQUARE}4 0 1 2 3\n",
         f"OFF\r\n4 1 0\r\n{SQUARE}4 0 1 2 3 255 0 0\r\n".replace("\n", "\r\n").replace("\r\r", "\r"),
         f"OFF\n4 1\n{SQUARE}4 0 1 2 3 0.5 0.5 0.5 1.0\n",
         "OFF\n4 1 0\n0 0 0 1 0 0\n1 1 0 0 1 0\n4 0 1 2 3\n",
