@@ -4,9 +4,9 @@
 from __future__ import annotations
 
 import json
-import math
 import struct
 import zlib
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -18,6 +18,7 @@ MAGIC = b"\x89ESOPM\r\n"
 VERSION = 1
 _FIXED = struct.Struct("<8sHHIII")  # magic, version, flags, bytes of header and table, their checksum
 _LARGEST_HEADER = 1 << 24
+_LARGEST_NUMBER = 3.5e38  # of a transform: float32, as Blender stores them
 # a reader must know all of these to understand a file
 FEATURES = ("wedges", "attributes", "extra-faces", "edges", "turned", "quantised")
 _ROW = np.dtype([("length", "<u4"), ("checksum", "<u4"), ("places", "<u4"), ("faces", "<u4"), ("error", "<f4"),
@@ -182,11 +183,16 @@ def _header(text: bytes) -> dict[str, Any]:
     return header
 
 
+def is_transform(matrix: Sequence[float]) -> bool:
+    """Tell whether these are the numbers of an object's place."""
+    return len(matrix) == 16 and all(abs(number) <= _LARGEST_NUMBER for number in matrix)
+
+
 def _check_objects(meta: dict[str, Any], meshes: int) -> None:
     for entry in meta.get("objects", []):
         if not (isinstance(entry["name"], str) and type(entry["mesh"]) is int and 0 <= entry["mesh"] < meshes):
             raise TypeError
-        if len(entry["matrix"]) != 16 or not all(math.isfinite(number) for number in entry["matrix"]):
+        if not is_transform(entry["matrix"]):
             raise ValueError
 
 

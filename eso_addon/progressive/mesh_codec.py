@@ -3,6 +3,9 @@
 
 from __future__ import annotations
 
+import math
+import operator
+import re
 import struct
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -20,6 +23,7 @@ from .geometry import Grid, Shape, lossless_grid, quantised_grid
 from .patches import Patches
 from .source import DOMAINS
 
+_DTYPE = re.compile("[<|][biuf][1248]")
 _BLOCK = struct.Struct("<II")  # bytes of symbols, of plain bits; columns fill the rest
 
 
@@ -427,8 +431,8 @@ def _prepare_words(codec: _Codec, descriptors: list[tuple], limit: int) -> None:
     sizes = {"vertex": header["vertices"], "corner": len(codec.patches.wedge_parents), "face": faces, "side": faces,
              "edge": header["edges"]}
     for domain, name, dtype, shape in descriptors:
-        items = int(np.prod(shape, dtype=np.int64)) * (3 if domain == "side" else 1) * max(dtype.itemsize // 4, 1)
-        if items * sizes[domain] > limit:
+        items = math.prod(shape) * (3 if domain == "side" else 1) * max(dtype.itemsize // 4, 1)
+        if items * max(sizes[domain], 1) > limit:
             raise StreamError("the stream's counts are larger than it can hold: fetch the file again")
         words = np.zeros((sizes[domain], items), np.int64)
         codec.words.setdefault(domain, []).append((name, words, min(dtype.itemsize, 4)))
@@ -492,10 +496,11 @@ def _descriptors(header: dict[str, Any]) -> list[tuple]:
     result = []
     try:
         for domain, name, dtype, shape in header["attributes"]:
-            kind = np.dtype(dtype)
-            if domain not in DOMAINS or kind.kind not in "biuf" or not isinstance(name, str) or len(shape) > 1:
+            if domain not in DOMAINS or not _DTYPE.fullmatch(dtype) or not isinstance(name, str):
                 raise ValueError
-            result.append((domain, name, kind, tuple(int(size) for size in shape)))
-    except (ValueError, TypeError):
+            if len(shape) > 1 or min(shape, default=0) < 0:
+                raise ValueError
+            result.append((domain, name, np.dtype(dtype), tuple(operator.index(size) for size in shape)))
+    except (ValueError, TypeError, OverflowError):
         raise StreamError("the header of the stream says nothing sensible: fetch the file again") from None
     return result

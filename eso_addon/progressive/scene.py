@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..core.mesh import MeshError
+from .container import is_transform
 from .progressive import Level, Progressive, read_part, write_bytes
 from .stream import decode, encode, file_order
 
@@ -79,6 +80,9 @@ class Scene:
         """Return the file; see `Progressive.save`."""
         if not self.meshes:
             raise MeshError("there is no mesh to write")
+        for entry in self.meta.get("objects", []):
+            if not is_transform(entry["matrix"]):
+                raise MeshError(f"{entry['name']} has a transform that is not finite: mend it")
         return encode([mesh.encoded(bits=bits, keep_order=keep_order) for mesh in self.meshes], self.meta,
                       self.scales())
 

@@ -106,7 +106,7 @@ def _attributes(given: Mapping[str, Mapping[str, ArrayLike]], counts: dict[str, 
             if array.dtype.char not in _KINDS or array.shape[: len(wanted)] != wanted or array.ndim > len(wanted) + 1:
                 raise MeshError(f"{domain} attribute {name!r} must be numbers of shape {wanted} or one more axis, "
                                 f"not {array.shape} {array.dtype}")
-            checked[domain][name] = array
+            checked[domain][name] = array.astype(array.dtype.newbyteorder("<"), copy=False)
     return checked
 
 

@@ -14,6 +14,7 @@ import pytest
 from eso_addon.progressive import container, stream
 from eso_addon.progressive.errors import StreamError
 from eso_addon.progressive.progressive import Progressive, from_bytes, progressive
+from eso_addon.progressive.scene import scene_from_bytes
 
 from .meshes import grid, spoil
 
@@ -132,6 +133,17 @@ def test_what_once_failed() -> None:
     for name, value in (("extra", True), ("places", True), ("grid", [0, 1e308, 0, 0, 0, 3]), ("lanes", 0)):
         header = {**parts.header, "meshes": [{**parts.header["meshes"][0], name: value}]}
         assert use(container.write(container.Container(header, parts.table, parts.blocks)), partial=False) is None
+    # counts that no float holds, and types that numpy reads and nobody writes
+    far = {"names": ["a"], "formats": ["f4"], "offsets": [10**30]}
+    for kind, shape in (("<f4", [float("inf")]), ("<f4", [10**400]), ("<f4", [-1]), ("(", []), (far, []), (">f4", [])):
+        attributes = [["vertex", "g", kind, shape]]
+        header = {**parts.header, "meshes": [{**parts.header["meshes"][0], "attributes": attributes}]}
+        assert use(container.write(container.Container(header, parts.table, parts.blocks)), partial=False) is None
+    for number in (1e308, 10**400, float("nan"), float("-inf"), "1", None):
+        objects = [{"name": "a", "mesh": 0, "matrix": [number] * 16}]
+        header = {**parts.header, "meta": {"objects": objects}}
+        with pytest.raises(StreamError):
+            scene_from_bytes(container.write(container.Container(header, parts.table, parts.blocks)))
     # a signalling NaN is a position like any other
     points, faces = grid(4, 4, np.random.default_rng(0))
     points.view(np.uint32)[0, 0] = 0x7F800001

@@ -109,3 +109,13 @@ def test_bad_input_is_told() -> None:
         progressive(np.zeros((3, 3)), [[0, 1, 2]], speed=3)
     with pytest.raises(MeshError, match="shape"):
         progressive(np.zeros((3, 3)), [[0, 1, 2]], attributes={"face": {"material": [1, 2]}})
+
+
+def test_bytes_in_either_order_are_the_same_numbers() -> None:
+    points, faces = grid(4, 4, np.random.default_rng(0))
+    values = np.arange(len(points))
+    streams = [progressive(points.astype(f"{order}f4"), faces.astype(f"{order}i8"),
+                           attributes={"vertex": {"v": values.astype(f"{order}i4")}}).to_bytes(keep_order=True)
+               for order in "<>"]
+    assert streams[0] == streams[1]
+    assert np.array_equal(from_bytes(streams[1]).restore().attributes["vertex"]["v"], values)

@@ -74,3 +74,9 @@ def test_one_mesh_is_asked_of_a_file_of_several(scene: Scene) -> None:
         from_bytes(scene.to_bytes())
     with pytest.raises(MeshError, match="no mesh"):
         Scene([]).to_bytes()
+
+
+def test_a_place_that_is_none_is_refused_before_it_is_written(scene: Scene) -> None:
+    lost = Scene(scene.meshes, {"objects": [{"name": "lost", "mesh": 0, "matrix": [float("nan")] * 16}]})
+    with pytest.raises(MeshError, match="lost has a transform that is not finite"):
+        lost.to_bytes()
