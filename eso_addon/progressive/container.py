@@ -178,7 +178,7 @@ def _header(text: bytes) -> dict[str, Any]:
             raise
         raise StreamError("the header of the stream says nothing sensible: fetch the file again") from None
     if unknown:
-        names = ", ".join(sorted(map(str, unknown)))
+        names = ", ".join(sorted(map(str, unknown)))[:100]
         raise StreamError(f"the stream needs what this reader does not know ({names}): update it")
     return header
 

@@ -221,6 +221,8 @@ class _Codec:
             self.patches.turned[own] = values & 1
 
     def _values(self, block: ColumnWriter | ColumnReader, domain: str, first: int, last: int, source: Ints) -> None:
+        if first == last:  # else damage could ask for millions of columns that hold nothing
+            return
         for _, words, width in self.words.get(domain, ()):
             for column in words.T:
                 if first == 0:
@@ -430,9 +432,11 @@ def _prepare_words(codec: _Codec, descriptors: list[tuple], limit: int) -> None:
     faces = header["extra"] + int(codec.table_faces[-1])
     sizes = {"vertex": header["vertices"], "corner": len(codec.patches.wedge_parents), "face": faces, "side": faces,
              "edge": header["edges"]}
+    room = 0
     for domain, name, dtype, shape in descriptors:
         items = math.prod(shape) * (3 if domain == "side" else 1) * max(dtype.itemsize // 4, 1)
-        if items * max(sizes[domain], 1) > limit:
+        room += items * max(sizes[domain], 1)
+        if room > limit:
             raise StreamError("the stream's counts are larger than it can hold: fetch the file again")
         words = np.zeros((sizes[domain], items), np.int64)
         codec.words.setdefault(domain, []).append((name, words, min(dtype.itemsize, 4)))

@@ -139,6 +139,14 @@ def test_what_once_failed() -> None:
         attributes = [["vertex", "g", kind, shape]]
         header = {**parts.header, "meshes": [{**parts.header["meshes"][0], "attributes": attributes}]}
         assert use(container.write(container.Container(header, parts.table, parts.blocks)), partial=False) is None
+    # columns without rows, and more of them than a file of this size fills
+    for domain, shape in (("edge", 10**6), ("vertex", 10**4), ("edge", 10**9)):
+        attributes = [[domain, f"a{number}", "<f4", [shape]] for number in range(300)]
+        header = {**parts.header, "meshes": [{**parts.header["meshes"][0], "attributes": attributes}]}
+        assert use(container.write(container.Container(header, parts.table, parts.blocks)), partial=False) is None
+    header = {**parts.header, "meshes": [{**parts.header["meshes"][0], "needs": ["9" * 5000]}]}
+    with pytest.raises(StreamError, match=r"^.{,200}$"):
+        from_bytes(container.write(container.Container(header, parts.table, parts.blocks)))
     for number in (1e308, 10**400, float("nan"), float("-inf"), "1", None):
         objects = [{"name": "a", "mesh": 0, "matrix": [number] * 16}]
         header = {**parts.header, "meta": {"objects": objects}}
