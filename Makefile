@@ -44,7 +44,7 @@ package: $(READY)
 
 gui: package
 	BLENDER="$(BLENDER)" scripts/gui_blender.sh run out/gui "$$(ls -t dist/eso_lod-*.zip | head -1)" tests_gui scenes.py
-	mkdir -p docs/images/window && cp out/gui/pictures/*.png out/gui/figures.json docs/images/window/
+	for picture in docs/images/window/*.png; do cp "out/gui/pictures/$${picture##*/}" docs/images/window/ || exit; done
 
 pictures: $(READY)
 	$(PY) scripts/make_pictures.py docs/images

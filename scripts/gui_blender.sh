@@ -51,8 +51,15 @@ inside() {  # inside COMMANDS [FOLDER=NAME ...]: run in the Debian, with folders
 }
 
 run() {
-    local out zip folder script=$4
+    local out zip folder script=$4 tool tools
     setup
+    if [ -n "${BLENDER:-}" ]; then
+        command -v "$BLENDER" >/dev/null || { echo "BLENDER=$BLENDER cannot be run: give the path of a Blender" >&2; exit 2; }
+        [ -n "${DISPLAY:-}" ] && tools="mogrify import" || tools="Xvfb mogrify import"
+        for tool in $tools; do
+            command -v "$tool" >/dev/null || { echo "$tool is missing: install Xvfb and ImageMagick (apt-get install xvfb imagemagick)" >&2; exit 2; }
+        done
+    fi
     mkdir -p "$1"; out=$(realpath "$1"); zip=$(realpath "$2"); folder=$(realpath "$3"); shift 4
     rm -rf "$out/user"; mkdir -p "$out/user"
     if [ -n "${BLENDER:-}" ]; then
