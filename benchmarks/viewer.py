@@ -119,7 +119,7 @@ onmessage = async ({ data }) => {
 
 
 class _Bench(viewer_server._Handler):
-    """Also gives out three.js whole, and what is compared with."""
+    """Also gives out three.js whole, and what is compared with; notes when how much of the mesh goes out."""
 
     def _answer(self, *, body: bool) -> None:
         server: Any = self.server
@@ -137,14 +137,23 @@ class _Bench(viewer_server._Handler):
         self.wfile.write(data)
         return None
 
+    def _send_mesh(self, body: bool) -> None:
+        server: Any = self.server
+        size = server.path.stat().st_size
+        asked = self._range(size, self.headers.get("If-Range", ""))
+        server.sent.append((time.monotonic(), asked[1] - asked[0] + 1 if asked else size))
+        super()._send_mesh(body)
+
 
 @contextmanager
-def _serving(path: Path, extra: dict[str, bytes] | None = None) -> Iterator[str]:
+def _serving(path: Path, extra: dict[str, bytes] | None = None,
+             sent: list[tuple[float, int]] | None = None) -> Iterator[str]:
     class Server(viewer_server.MeshServer):
         handler = _Bench
 
     server: Any = Server(path)
     server.extra = extra or {}
+    server.sent = [] if sent is None else sent
     threading.Thread(target=server.serve_forever, daemon=True).start()
     yield server.url
     server.shutdown()
@@ -253,33 +262,25 @@ def decoding(browser: Any, path: Path, drc: bytes) -> dict[str, Any]:  # noqa: A
 
 def throttled(browser: Any, path: Path, rate: float = 100_000.0) -> dict[str, Any]:  # noqa: ANN401
     """Load at so many bytes a second, twice, as reading pictures takes time: first the pace, then the pictures."""
-    with _serving(path) as url:  # the client keeps to its budget by itself
-        return {**_pace(browser, f"{url}?up=y&budget={rate:.0f}", rate),
-                **_differences(browser, f"{url}?up=y&budget={rate:.0f}")}
+    sent: list[tuple[float, int]] = []
+    with _serving(path, sent=sent) as url:  # the client keeps to its budget by itself
+        paced = _pace(browser, f"{url}?up=y&budget={rate:.0f}")
+        over = max(sum(count for at, count in sent if begin <= at < begin + 1) for begin, _ in sent) / rate
+        return {"bytes_over_budget": over, **paced, **_differences(browser, f"{url}?up=y&budget={rate:.0f}")}
 
 
-def _pace(browser: Any, url: str, rate: float) -> dict[str, Any]:  # noqa: ANN401
-    """Return the most bytes of any second over the budget, and how often the picture changes."""
+def _pace(browser: Any, url: str) -> dict[str, Any]:  # noqa: ANN401
+    """Return how often the picture changes."""
     page = browser.new_page(viewport={"width": 640, "height": 480})
     page.add_init_script("""window.levels = [];
         for (const name of ['first', 'level']) document.addEventListener('eso-' + name,
-          ({ target }) => window.levels.push([performance.now(), target.stats.received]));""")
+          () => window.levels.push(performance.now()));""")
     page.goto(url)
-    _wait(page, "s.shown > 0")
-    seen = []
-    done = False
-    while not done:
-        now, figures = page.evaluate("[performance.now(), document.querySelector('eso-viewer').stats]")
-        seen.append((now / 1000, figures["received"]))
-        done = figures["identical"] and figures["shown"] == figures["faces"]
-        time.sleep(0.02)
-    times = [one[0] / 1000 for one in page.evaluate("window.levels")]
+    _wait(page, "s.identical && s.shown === s.faces")
+    waits = np.diff(page.evaluate("window.levels")) / 1000
     page.close()
-    over = [(more - less) / (rate * (later - early)) for early, less in seen for later, more in seen
-            if later - early >= 1.0]
-    waits = np.diff(times)
-    return {"bytes_over_budget": max(over, default=0.0), "pictures": len(times),
-            "longest_wait_s": float(waits.max(initial=0.0)), "median_wait_s": float(np.median(waits))}
+    return {"pictures": len(waits) + 1, "longest_wait_s": float(waits.max(initial=0.0)),
+            "median_wait_s": float(np.median(waits))}
 
 
 def _differences(browser: Any, url: str) -> dict[str, Any]:  # noqa: ANN401

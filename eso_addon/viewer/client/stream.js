@@ -7,7 +7,9 @@ import { Mesh } from './mesh.js';
 const FIRST = 8192; // bytes asked for at first: the first picture comes from them
 const PATIENCE = 400; // milliseconds that the first picture waits for more than the base
 const STEP = 250; // milliseconds between pictures while more comes
-const BUSY = 1000; // and where it is not the line that takes the time
+const BUSY = 1000; // where it is decoding that takes the time
+const SLOW = 200; // where it is the line: what came is then spread until more comes, and
+const SPARE = 400; // so many milliseconds beyond
 const now = () => performance.now();
 const { port1, port2 } = new MessageChannel();
 const breath = () => new Promise((resolve) => { port1.onmessage = resolve; port2.postMessage(0); });
@@ -27,6 +29,7 @@ export function makeStream(line, wish, show, tell) {
   let splits = 0;
   let busy = 0; // milliseconds spent on splits
   let paid = 0; // until when the budget is spent
+  let lately = []; // [time, bytes] of what came within a second
   let pace = { time: begun, bytes: 0 };
   let speed = 0; // bytes a second
   let abort;
@@ -97,15 +100,21 @@ export function makeStream(line, wish, show, tell) {
 
   // -- bytes -------------------------------------------------------------------------------------------------------
 
-  /** Wait until the budget allows some bytes; gives how many. */
+  /**
+   * Wait until the budget allows some bytes; gives how many. With these no second has more than its bytes, whenever they come: they are
+   * asked for when what came in the second before leaves room for them.
+   */
   async function allowance() {
     for (;;) {
       const { budget } = wish;
       if (!budget) return Infinity;
-      const least = Math.max(50, 1024000 / budget); // milliseconds of the line that are worth a request
-      paid = Math.max(paid, now() - 2 * least);
-      if (now() - paid >= least) return Math.floor(((now() - paid) * budget) / 1000);
-      await change(paid + least - now());
+      const least = Math.min(Math.max(50, 1024000 / budget), 500); // milliseconds of the line that are worth a request
+      const time = now();
+      paid = Math.max(paid, time - 2 * least);
+      lately = lately.filter(([at]) => at > time - 1000);
+      const most = Math.min(time - paid, 1000 - (1000 * lately.reduce((sum, [, bytes]) => sum + bytes, 0)) / budget);
+      if (most >= least) return Math.floor((most * budget) / 1000);
+      await change(Math.ceil(least - Math.max(most, 0)));
     }
   }
 
@@ -122,15 +131,18 @@ export function makeStream(line, wish, show, tell) {
     received += part.length;
     if (troubled) tell({ type: 'trouble', text: '' });
     troubled = false;
-    if (wish.budget) paid += (1000 * part.length) / wish.budget;
     const time = now();
+    if (wish.budget) {
+      paid += (1000 * part.length) / wish.budget;
+      lately.push([time, part.length]);
+    }
     pace.bytes += part.length;
     if (time > pace.time + 200) {
       const last = (1000 * pace.bytes) / (time - pace.time);
       speed = speed ? (speed + last) / 2 : last;
       pace = { time, bytes: 0 };
     }
-    if (time > told + 60) report();
+    if (wish.budget || time > told + 60) report();
   }
 
   /** Note that the blocks have these bytes of the file. */
@@ -266,17 +278,19 @@ export function makeStream(line, wish, show, tell) {
     if (!head || drawing || !mayBegin()) return;
     clearTimeout(timer);
     const open = rows.filter(wanted);
-    const rest = posted + (2 * busy > now() - begun ? BUSY : STEP) - now();
+    const rate = speed || wish.budget;
+    const slow = open.length > 0 && rate > 0 && line.size > rate; // all of it takes more than a second
+    const rest = posted + (slow ? SLOW : 2 * busy > now() - begun ? BUSY : STEP) - now();
     if (open.length && rest > 0 && !hurry) {
       timer = setTimeout(present, rest);
       return;
     }
     let target = Math.min(levelFaces(), wish.cap);
     const left = there() - shown;
-    const wait = open.length && speed ? (1000 * (open[0].length - open[0].have)) / speed : 0;
-    if (wait > 1.5 * STEP && left > 0 && target > shown) {
-      target = Math.min(target, shown + Math.ceil((left * 1.5 * STEP) / wait));
-      timer = setTimeout(present, STEP);
+    if (slow && shown && left > 0) {
+      const due = (1000 * (open[0].length - open[0].have)) / rate;
+      target = Math.min(target, shown + Math.ceil((left * SLOW) / (due + SPARE)));
+      timer = setTimeout(present, SLOW);
     }
     const places = placesFor(target);
     if (places.every((count, at) => count === levels[at])) return;
