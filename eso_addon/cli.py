@@ -129,6 +129,8 @@ def carry_out(args: argparse.Namespace) -> int:
         return _refuse(f"{error.strerror}: {error.filename}" if error.strerror and error.filename else str(error))
     except ValueError as error:
         return _refuse(str(error))
+    except KeyboardInterrupt:
+        return _refuse("stopped")
     except MemoryError:
         return _refuse(f"{args.input.name} is too large for this computer's memory")
     return 0

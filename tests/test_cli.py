@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The command line: words, exit codes, formats, and one line for every kind of bad input."""
 
+import argparse
 import json
 import subprocess
 import sys
@@ -9,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from eso_addon.cli import main
+from eso_addon.cli import carry_out, main
 from eso_addon.files.off import read_off, write_off
 from eso_addon.settings.profiles import PROFILES
 
@@ -290,6 +291,14 @@ def test_a_count_that_is_out_of_reach_is_told(ball: Path, tmp_path: Path, capsys
 def test_any_error_is_enough(ball: Path, tmp_path: Path) -> None:
     assert run("simplify", ball, tmp_path / "out.off", "--max-error", "1e300") == 0
     assert len(read_off(tmp_path / "out.off")[1]) < 100
+
+
+def test_ctrl_c_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
+    def interrupted(_: argparse.Namespace) -> None:
+        raise KeyboardInterrupt
+
+    assert carry_out(argparse.Namespace(run=interrupted)) == 1
+    assert capsys.readouterr().err == "eso_lod: stopped\n"
 
 
 def test_version(capsys: pytest.CaptureFixture[str]) -> None:

@@ -189,16 +189,23 @@ def _started(make: Callable[..., Any], workers: int) -> Any:  # noqa: ANN401 - D
 
 @contextmanager
 def stopping_well() -> Iterator[None]:
-    """Take the system's wish that this process ends for Ctrl-C, so that a run ends in order."""
+    """Take the system's wish that this process ends for Ctrl-C, and hear the first one alone: a run ends in order."""
     if threading.current_thread() is not threading.main_thread():  # which alone hears of it
         yield
         return
 
+    before = {wish: signal.getsignal(wish) for wish in (signal.SIGTERM, signal.SIGINT)
+              if signal.getsignal(wish) is not signal.SIG_IGN}
+
     def stop(*_: object) -> None:
+        for wish in before:  # impatience must not leave drafts and processes behind
+            signal.signal(wish, lambda *_: None)
         raise KeyboardInterrupt
 
-    before = signal.signal(signal.SIGTERM, stop)
     try:
+        for wish in before:
+            signal.signal(wish, stop)
         yield
     finally:
-        signal.signal(signal.SIGTERM, before)
+        for wish, handler in before.items():
+            signal.signal(wish, handler)
