@@ -122,6 +122,15 @@ def test_a_file_that_goes_away(ask: Callable, stream: Path) -> None:
     assert ask()[0] == 404
 
 
+def test_the_worker_comes_as_one_and_its_modules_apart(ask: Callable) -> None:
+    status, headers, body = ask("/worker.js")
+    assert status == 200
+    assert int(headers["Content-Length"]) == len(body)
+    assert b"\nimport " not in body
+    assert b"modules['stream.js'] =" in body
+    assert ask("/stream.js")[2].startswith(b"//")
+
+
 def test_all_files_of_the_client_are_known() -> None:
     assert {path.name for path in CLIENT.iterdir()} == set(FILES)
 
