@@ -55,7 +55,7 @@ class _Handler(BaseHTTPRequestHandler):
             return self._send_mesh(body)
         if name not in FILES:  # names are looked up, never joined to a path
             return self._refuse(HTTPStatus.NOT_FOUND, "there is nothing here")
-        # the worker's modules as one: fourteen answers one after the other took longer than the first picture
+        # the worker's modules as one: the first byte of the mesh waits for all of them
         data = bundle(name).encode() if name == "worker.js" else (CLIENT / name).read_bytes()
         self._head(HTTPStatus.OK, {"Content-Type": FILES[name], "Content-Length": str(len(data))})
         if body:
