@@ -193,7 +193,7 @@ def _add_engine_words(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--preset", choices=("paper",), help="the equations as the paper prints them")
     parser.add_argument("--placement", choices=("optimal", "endpoint"), help="where a new vertex stands")
     parser.add_argument("--prune", type=_length, metavar="SIZE", help="drop loose parts smaller than this")
-    parser.add_argument("--threads", type=_count, metavar="N", help="of the engine (default: 1)")
+    parser.add_argument("--threads", type=_count, metavar="N", help="of the engine (default: 1; 2 for large meshes)")
     parser.add_argument("--no-weld", dest="weld", action="store_false", help="keep vertices at equal positions apart")
     parser.add_argument("--symmetry", choices=("x", "y", "z"), help="symmetric results of symmetric meshes")
     for line, title in _LINES.items():

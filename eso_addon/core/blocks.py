@@ -1,11 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Long arrays in blocks that stay in the processor's cache, on several threads where they pay."""
 
+import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import TypeVar
 
 Result = TypeVar("Result")
+
+# faces from which on a second thread pays: below, its share of each call is too short to get Python's lock in time
+_MANY = 250_000
 
 
 class Blocks:
@@ -14,12 +18,13 @@ class Blocks:
     Parameters
     ----------
     threads : int, optional
-        One where it is not given: the calls are short, and two threads that hand Python's lock to each other were
-        slower (docs/decisions/engine.md).
+        Where it is not given, two for a large mesh on a machine that has them, else one.
+    faces : int
+        Of the mesh.
     """
 
-    def __init__(self, threads: int | None = None) -> None:
-        self.threads = threads or 1
+    def __init__(self, threads: int | None = None, faces: int = 0) -> None:
+        self.threads = threads or min(2 if faces >= _MANY else 1, os.cpu_count() or 1)
         self._pool = ThreadPoolExecutor(self.threads) if self.threads > 1 else None
 
     def map(self, function: Callable[[slice], Result], count: int, size: int) -> list[Result]:

@@ -96,12 +96,12 @@ def recording_steps(original: Mesh, options: Options, least: int) -> Generator[f
     if mirror is not None:
         faces, least = faces[mirror.half], max((least - rest) // 2, 0)
     mesh = prepare(vertices, faces, join=options.weld, prune=options.prune)
-    blocks = Blocks(options.threads)
+    blocks = Blocks(options.threads, mesh.faces.shape[1])
     try:
         yield 0.02
         guidance = guidance_of(mesh, original, options, mirror)
         guide = guide_for(mesh, options, guidance.edges) if options.method == "feature" else None
-        quadrics = initial_quadrics(mesh, options, blocks, guidance)
+        quadrics = initial_quadrics(mesh, options, guidance)
         yield 0.12
         # further than asked: a refit puts vertices back
         spare = spare_of(least, options, guidance.carrier)

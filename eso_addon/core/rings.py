@@ -81,14 +81,13 @@ class _Columns(NamedTuple):
     vertices: Ints
 
 
-def near_pairs(offsets: Ints, neighbours: Ints, rings: int, part: range | None = None) -> Iterator[Pairs]:
+def near_pairs(offsets: Ints, neighbours: Ints, rings: int) -> Iterator[Pairs]:
     """Find all pairs of vertices within so many rings of each other, each once.
 
     Parameters
     ----------
     offsets, neighbours : one-rings of n vertices as CSR; quick where neighbours have numbers close to each other
     rings : 1 or more
-    part : only the pairs that belong to these vertices: so may several threads share the work
 
     Yields
     ------
@@ -106,14 +105,13 @@ def near_pairs(offsets: Ints, neighbours: Ints, rings: int, part: range | None =
     unused = np.zeros(0, dtype=np.int64)
     graph = _Graph(offsets, neighbours, counts, np.full(count, -1), unused)
     later = _later_bits(FRAME)
-    part = range(count) if part is None else part
-    for start in range(part.start, part.stop, FRAME * FRAMES):
-        block = np.arange(start, min(start + FRAME * FRAMES, part.stop))
+    for start in range(0, count, FRAME * FRAMES):
+        block = np.arange(start, min(start + FRAME * FRAMES, count))
         vertices, cutting = _cut_out(graph, block, rings)
         first = int(np.searchsorted(vertices, start))
         for pairs in _block_pairs(cutting, first + block - start, is_hub[vertices], later, rings):
             yield pairs._replace(vertices=np.take(vertices, pairs.vertices))
-    yield from _hub_pairs(graph, is_hub, around_hubs, rings, part)
+    yield from _hub_pairs(graph, is_hub, around_hubs, rings)
 
 
 def _cut_out(graph: _Graph, block: Ints, rings: int) -> tuple[Ints, _Graph]:
@@ -159,11 +157,9 @@ def _block_pairs(graph: _Graph, block: Ints, is_hub: Bools, later: Bits, rings: 
             yield Pairs(columns.vertices, places, counts[owners], others)
 
 
-def _hub_pairs(graph: _Graph, is_hub: Bools, around: list[Ints], rings: int, part: range) -> Iterator[Pairs]:
+def _hub_pairs(graph: _Graph, is_hub: Bools, around: list[Ints], rings: int) -> Iterator[Pairs]:
     """Find the pairs that have a hub in them, hub by hub: there are few, and each has many."""
     for hub, ring in zip(np.flatnonzero(is_hub), around):
-        if hub not in part:
-            continue
         near = np.concatenate(_levels(graph, np.array([hub]), ring, rings)[0])
         graph.row[near] = -1
         vertices = near.compress(~is_hub[near] | (near >= hub))  # the hub itself is the first of them

@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .adjacency import one_rings, sorting_order
-from .blocks import Blocks
 from .mesh import MeshError, check_mesh, morton_order
 from .normals import face_area_vectors, lengths, vertex_normals
 from .rings import Pairs, near_pairs
@@ -16,9 +15,6 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 METHODS = ("qem", "cf", "so", "eso")
-# parts that threads share, and their least number of vertices
-PARTS = 4
-LEAST_PART = 4096
 
 
 def vertex_weights(vertices: ArrayLike, faces: ArrayLike, *, method: str = "eso", rings: int = 3) -> Floats:
@@ -115,7 +111,7 @@ def edge_curvature_factor(defects: Floats, areas: Floats, edges: Ints) -> Floats
     return np.divide(turn, area, out=np.zeros_like(area), where=area > 0.0)
 
 
-def surface_variation(vertices: Floats, faces: Ints, rings: int, blocks: Blocks | None = None) -> Floats:
+def surface_variation(vertices: Floats, faces: Ints, rings: int) -> Floats:
     """Return the extended shape operator S of each vertex (Equation 8; with one ring Equation 7).
 
     S is the sum of the differences of unit normals between a vertex and all vertices within so many rings,
@@ -126,7 +122,6 @@ def surface_variation(vertices: Floats, faces: Ints, rings: int, blocks: Blocks 
     vertices : (n, 3) float64 positions
     faces : (m, 3) int64 triangles, with the winding of neighbours agreeing
     rings : number of rings, 1 or more
-    blocks : the threads to use; its own where none are given. The result does not depend on them.
 
     Returns
     -------
@@ -136,19 +131,10 @@ def surface_variation(vertices: Floats, faces: Ints, rings: int, blocks: Blocks 
     offsets, neighbours = one_rings(faces, count)
     positions, normals = _rows_of_four(vertices), _rows_of_four(vertex_normals(vertices, faces))
 
-    def sums(part: slice) -> tuple[Floats, Floats]:
-        turns, ways = np.zeros(count), np.zeros(count)
-        for pairs in near_pairs(offsets, neighbours, rings, range(part.start, part.stop)):
-            _add_distances(turns, normals, pairs)
-            _add_distances(ways, positions, pairs)
-        return turns, ways
-
-    threads = blocks or Blocks()
-    # always the same parts, so that the order of the sums does not hang on the number of threads
-    parts = threads.map(sums, count, max(LEAST_PART, -(-count // PARTS)))
-    if blocks is None:
-        threads.close()
-    turns, ways = (np.add.reduce(column) for column in zip(*parts))
+    turns, ways = np.zeros(count), np.zeros(count)
+    for pairs in near_pairs(offsets, neighbours, rings):
+        _add_distances(turns, normals, pairs)
+        _add_distances(ways, positions, pairs)
     return np.divide(turns, ways, out=np.zeros(count), where=ways > 0.0)
 
 

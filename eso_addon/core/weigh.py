@@ -4,7 +4,6 @@
 import numpy as np
 
 from .attribute_quadrics import with_attributes
-from .blocks import Blocks
 from .guidance import Guidance
 from .lines import MATERIAL, Lines
 from .mesh import Floats
@@ -19,14 +18,13 @@ _BORDER = 10.0
 _LEAST = 1e-6
 
 
-def initial_quadrics(mesh: Prepared, options: Options, blocks: Blocks, guidance: Guidance | None = None) -> Floats:
+def initial_quadrics(mesh: Prepared, options: Options, guidance: Guidance | None = None) -> Floats:
     """Weigh the mesh: Equation 9, and the planes that hold boundaries.
 
     Parameters
     ----------
     mesh : Prepared
     options : Options
-    blocks : Blocks
     guidance : Guidance, optional
         Lines that are held in their place too, and what each vertex counts.
 
@@ -48,7 +46,7 @@ def initial_quadrics(mesh: Prepared, options: Options, blocks: Blocks, guidance:
         parts += line_quadrics(mesh.points, guidance.lines, options.line_weight)
     if options.method in ("so", "eso"):
         rings = 1 if options.method == "so" else int(options.rings)
-        weights = surface_variation(mesh.points.T, mesh.faces.T, rings, blocks)
+        weights = surface_variation(mesh.points.T, mesh.faces.T, rings)
         mean = weights.mean()
         if mean > 0:
             parts *= factors(weights / mean, options)

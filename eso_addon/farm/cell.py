@@ -66,7 +66,7 @@ def run_cell(folder: str, cell: int, dtype: str, least: int, scale: float, threa
     locked[mesh.vertex[held & (mesh.vertex >= 0)]] = True
     blocks = Blocks(threads)
     try:
-        quadrics = _quadrics(mesh, chosen, scale, blocks)
+        quadrics = _quadrics(mesh, chosen, scale)
         run = collapse_steps(mesh.points, mesh.faces, quadrics, mesh.opened, locked, least, chosen.rules, blocks)
         record = run_to_end(run)
     finally:
@@ -143,13 +143,13 @@ def _has_a_triangle(faces: Ints) -> bool:
     return bool(((a != b) & (b != c) & (c != a)).any())
 
 
-def _quadrics(mesh: Prepared, options: Options, scale: float, blocks: Blocks) -> NDArray[np.float64]:
+def _quadrics(mesh: Prepared, options: Options, scale: float) -> NDArray[np.float64]:
     """Weigh a cell as its whole mesh would be: Equation 9 without the mean, which only the whole mesh has."""
     plain = replace(options, method="qem") if options.method in ("so", "eso") else options
-    quadrics = initial_quadrics(mesh, plain, blocks)
+    quadrics = initial_quadrics(mesh, plain)
     if plain is not options:
         rings = 1 if options.method == "so" else int(options.rings)
-        weights = surface_variation(mesh.points.T, mesh.faces.T, rings, blocks) * (scale / mesh.size)
+        weights = surface_variation(mesh.points.T, mesh.faces.T, rings) * (scale / mesh.size)
         quadrics *= factors(weights, options)[:, None]
     return quadrics
 

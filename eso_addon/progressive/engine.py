@@ -86,7 +86,7 @@ def run_engine(mesh: Prepared, locked: Bools, lines: Ints, options: Options,
     options : Options
     target : int
     """
-    blocks = Blocks(options.threads)
+    blocks = Blocks(options.threads, mesh.faces.shape[1])
     try:
         told = Guidance(None, None, None, None)
         if len(lines):
@@ -95,7 +95,7 @@ def run_engine(mesh: Prepared, locked: Bools, lines: Ints, options: Options,
             none = np.zeros((len(mesh.vertex), 3)), np.zeros((int(mesh.face.max(initial=-1)) + 1, 3), np.int64)
             told = guidance_of(mesh, none, replace(options, attributes=marks, edges=lines))
         guide = guide_for(mesh, options, told.edges) if options.method == "feature" else None
-        quadrics = initial_quadrics(mesh, options, blocks, told)
+        quadrics = initial_quadrics(mesh, options, told)
         rules = replace(options.rules, passes=_PASSES)
         return (yield from collapse_steps(mesh.points, mesh.faces, quadrics, mesh.opened,
                                           locked if locked.any() else None, target, rules, blocks, guide))

@@ -26,7 +26,8 @@ class ESO_AP_preferences(bpy.types.AddonPreferences):
     )  # fmt: skip
     threads: IntProperty(
         name="Threads",
-        description="Processors that the engine may use; 0 takes one. Results do not depend on it",
+        description="Processors that the engine may use; 0 takes two for large meshes, else one. "
+                    "Results do not depend on it",
         default=0,
         min=0,
         max=64,

@@ -516,11 +516,12 @@ TEXTS: dict[str, tuple[str, str, str, str]] = {
         "Die Engine, mit deren Stufen neue Szenen beginnen", "El motor con cuyos niveles empiezan las escenas nuevas",
         "新しいシーンが最初に使うエンジン", "新场景默认使用的引擎"),
     "Threads": ("Threads", "Hilos", "スレッド数", "线程"),
-    "Processors that the engine may use; 0 takes one. Results do not depend on it": (
-        "Prozessoren, die benutzt werden dürfen; 0 nimmt einen. Die Ergebnisse hängen nicht davon ab",
-        "Procesadores que se pueden usar; 0 usa uno. El resultado no depende de ello",
-        "使用できるプロセッサー数。0 は 1 つ。結果には影響しません",
-        "可用的处理器数；0 为一个。结果不受影响"),
+    "Processors that the engine may use; 0 takes two for large meshes, else one. Results do not depend on it": (
+        "Prozessoren, die benutzt werden dürfen; 0 nimmt zwei bei großen Netzen, sonst einen. "
+        "Die Ergebnisse hängen nicht davon ab",
+        "Procesadores que se pueden usar; 0 usa dos con mallas grandes, si no uno. El resultado no depende de ello",
+        "使用できるプロセッサー数。0 は大きなメッシュで 2 つ、ほかは 1 つ。結果には影響しません",
+        "可用的处理器数；0 对大网格为两个，否则为一个。结果不受影响"),
     "Check with pymeshlab": ("Mit pymeshlab prüfen", "Comprobar con pymeshlab", "pymeshlab で確認", "用 pymeshlab 核对"),
     "Measure a second time with pymeshlab where it is installed, in a process of its own": (
         "Misst ein zweites Mal mit pymeshlab, wo es installiert ist, in einem eigenen Prozess",
