@@ -92,9 +92,6 @@ def vertex_normals(vertices: Floats, faces: Ints, area_vectors: Floats | None = 
     if area_vectors is None:
         area_vectors = face_area_vectors(vertices, faces)
     corners = np.ascontiguousarray(faces.T)
-    sums = np.zeros((len(vertices), 3))
-    for axis in range(3):
-        weights = np.ascontiguousarray(area_vectors[:, axis])
-        for corner in corners:
-            sums[:, axis] += np.bincount(corner, weights, len(vertices))
-    return unit(sums)
+    columns = np.ascontiguousarray(area_vectors.T)
+    return unit(np.array([sum(np.bincount(corner, column, len(vertices)) for corner in corners)
+                          for column in columns]).T)

@@ -23,15 +23,18 @@ _BLOCK = 8192
 _TINY = 1e-30
 
 
-def plane_quadrics(points: Floats, faces: Ints, *, area_weighted: bool) -> Floats:
+def plane_quadrics(faces: Ints, normals: Floats, areas: Floats, count: int, *, area_weighted: bool) -> Floats:
     """Sum the squared-distance matrices of the faces around each vertex (Equations 1 to 3).
 
     Every plane goes through its own vertex, so relative to the vertex only the 3 by 3 part is not zero.
 
     Parameters
     ----------
-    points : ndarray, (3, n) float64
     faces : ndarray, (3, m) int64
+    normals, areas : ndarray, (3, m) and (m,) float64
+        From `area_normals`.
+    count : int
+        Number of vertices, n.
     area_weighted : bool
         Weigh each plane by its face's area; without it by one, as the papers print it.
 
@@ -40,13 +43,12 @@ def plane_quadrics(points: Floats, faces: Ints, *, area_weighted: bool) -> Float
     ndarray, (6, n) float64
         a11 a12 a13 a22 a23 a33.
     """
-    normals, areas = area_normals(points, faces)
     scale = np.where(areas > 0, (areas if area_weighted else 1.0) / np.maximum(areas * areas, 1e-300), 0.0)
-    parts = np.empty((6, points.shape[1]))
+    parts = np.empty((6, count))
     scaled = normals * scale
     for part, (i, j) in zip(parts, PAIRS, strict=True):
         product = normals[i] * scaled[j]
-        part[:] = sum(np.bincount(corner, product, points.shape[1]) for corner in faces)
+        part[:] = sum(np.bincount(corner, product, count) for corner in faces)
     return parts
 
 

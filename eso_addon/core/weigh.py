@@ -35,10 +35,10 @@ def initial_quadrics(mesh: Prepared, options: Options, guidance: Guidance | None
     """
     if options.method == "feature":
         return np.zeros((mesh.points.shape[1], 0))
-    parts = plane_quadrics(mesh.points, mesh.faces, area_weighted=options.area_weighted)
+    normals, areas = area_normals(mesh.points, mesh.faces)
+    parts = plane_quadrics(mesh.faces, normals, areas, mesh.points.shape[1], area_weighted=options.area_weighted)
     if options.boundary_weight > 0 and len(mesh.boundary) and options.boundary_lines != "ignored":
         sides = mesh.boundary
-        normals, areas = area_normals(mesh.points, mesh.faces)
         face = sides % mesh.faces.shape[1]
         parts += boundary_quadrics(mesh.points, normals.take(face, axis=1) / np.maximum(areas.take(face), 1e-300),
                                    mesh.boundary_edges, options.boundary_weight)
@@ -46,7 +46,7 @@ def initial_quadrics(mesh: Prepared, options: Options, guidance: Guidance | None
         parts += line_quadrics(mesh.points, guidance.lines, options.line_weight)
     if options.method in ("so", "eso"):
         rings = 1 if options.method == "so" else int(options.rings)
-        weights = surface_variation(mesh.points.T, mesh.faces.T, rings)
+        weights = surface_variation(mesh.points.T, mesh.faces.T, rings, normals.T)
         mean = weights.mean()
         if mean > 0:
             parts *= factors(weights / mean, options)

@@ -20,7 +20,7 @@ from eso_addon.core.mesh import MeshError
 from eso_addon.core.normals import face_area_vectors
 from eso_addon.core.normals import lengths as vector_lengths
 from eso_addon.core.prepare import Prepared, prepare
-from eso_addon.core.quadrics import anchored, plane_quadrics
+from eso_addon.core.quadrics import anchored, area_normals, plane_quadrics
 from eso_addon.core.record import CollapseRecord
 
 from . import shapes
@@ -33,8 +33,14 @@ RULES = st.sampled_from([Rules(), Rules(endpoint=True), Rules(share=1.0), Rules(
 FIELDS = ("removed", "kept", "position", "faces_left", "cost", "stays")
 
 
+def plain_quadrics(mesh: Prepared, memory: float) -> np.ndarray:
+    normals, areas = area_normals(mesh.points, mesh.faces)
+    planes = plane_quadrics(mesh.faces, normals, areas, mesh.points.shape[1], area_weighted=True)
+    return anchored(planes, mesh.points, memory)
+
+
 def start(mesh: Prepared, rules: Rules, target: int = 0, *, locked: Bools | None = None, threads: int = 1) -> Any:  # noqa: ANN401
-    quadrics = anchored(plane_quadrics(mesh.points, mesh.faces, area_weighted=True), mesh.points, rules.memory)
+    quadrics = plain_quadrics(mesh, rules.memory)
     return collapse_steps(mesh.points, mesh.faces, quadrics, mesh.opened, locked, target, rules, Blocks(threads))
 
 
@@ -241,7 +247,7 @@ def test_half_edge_collapses_move_nothing(seed: int) -> None:
 
 def test_a_flat_sheet_costs_next_to_nothing() -> None:
     mesh = prepare(*shapes.sheet(20, 20, np.random.default_rng(0)))
-    quadrics = anchored(plane_quadrics(mesh.points, mesh.faces, area_weighted=True), mesh.points, 1e-9)
+    quadrics = plain_quadrics(mesh, 1e-9)
     _, record = shapes.drained(
         collapse_steps(mesh.points, mesh.faces, quadrics, mesh.opened, None, 2, Rules(memory=1e-9), Blocks(1)))
     assert_allclose(record.cost, 0.0, atol=1e-9)
@@ -253,7 +259,7 @@ def test_may_be_closed_at_any_time(steps_done: int) -> None:
     mesh = prepare(*shapes.ball(3))
     before = threading.active_count()
     blocks = Blocks(2)
-    quadrics = anchored(plane_quadrics(mesh.points, mesh.faces, area_weighted=True), mesh.points, 1e-7)
+    quadrics = plain_quadrics(mesh, 1e-7)
     given_arrays = mesh.points.copy(), mesh.faces.copy()
     steps = collapse_steps(mesh.points, mesh.faces, quadrics, mesh.opened, None, 8, Rules(), blocks)
     for _ in range(steps_done):

@@ -25,11 +25,11 @@ SAMPLES = 10_000
 
 def quadrics_of(mesh: Prepared, method: str) -> Floats:
     """Return Equation 9 with boundary planes, put together from the public parts."""
-    parts = plane_quadrics(mesh.points, mesh.faces, area_weighted=True)
+    normals, areas = area_normals(mesh.points, mesh.faces)
+    parts = plane_quadrics(mesh.faces, normals, areas, mesh.points.shape[1], area_weighted=True)
     if mesh.opened.any():
         sides = boundary_sides(mesh.faces, mesh.opened)
         face = sides % mesh.faces.shape[1]
-        normals, areas = area_normals(mesh.points, mesh.faces)
         edges = np.stack((mesh.faces.ravel()[sides], np.roll(mesh.faces, -1, axis=0).ravel()[sides]))
         parts += boundary_quadrics(mesh.points, normals[:, face] / areas[face], edges, 1.0)
     if method == "eso":

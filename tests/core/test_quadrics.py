@@ -68,10 +68,10 @@ def matrices(rows: Floats) -> Floats:
 
 def engine_quadrics(vertices: Floats, faces: Ints, *, area_weighted: bool, boundary: float, memory: float) -> Floats:
     points, corners = vertices.T.copy(), faces.T.copy()
-    parts = plane_quadrics(points, corners, area_weighted=area_weighted)
+    normals, areas = area_normals(points, corners)
+    parts = plane_quadrics(corners, normals, areas, len(vertices), area_weighted=area_weighted)
     if boundary > 0:
         sides = boundary_sides(corners, open_vertices(corners, len(vertices)))
-        normals, areas = area_normals(points, corners)
         face = sides % len(faces)
         edges = np.stack((corners.ravel()[sides], np.roll(corners, -1, axis=0).ravel()[sides]))
         parts += boundary_quadrics(points, normals[:, face] / areas[face], edges, boundary)
@@ -164,7 +164,8 @@ def test_memory_moves_with_the_vertex(seed: int, memory: float) -> None:
 @pytest.mark.parametrize("area_weighted", [True, False])
 def test_faces_without_area_weigh_nothing(area_weighted: bool) -> None:
     vertices = np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0]], float)
-    rows = plane_quadrics(vertices.T.copy(), np.array([[0], [1], [2]]), area_weighted=area_weighted)
+    corners = np.array([[0], [1], [2]])
+    rows = plane_quadrics(corners, *area_normals(vertices.T.copy(), corners), 3, area_weighted=area_weighted)
     assert_array_equal(rows, 0.0)
     held = anchored(rows, vertices.T.copy(), 1e-7)
     assert np.isfinite(optimal_places(held)).all()  # solvable all the same
