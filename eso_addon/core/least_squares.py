@@ -16,6 +16,7 @@ Floats = NDArray[Any]  # float64, or float32 where only a choice hangs on it
 Ints = NDArray[np.int64]
 
 _DAMPING = 0.2  # pull towards the present position, relative to what evenly spread samples weigh
+_ALONG = 0.1  # of a step along its face: the surface stays where it is, only the vertex slides
 _TILT = 0.03  # weight of a tilt against the original's normal, times an edge, beside that of a distance
 _AGREE = 0.5  # least cosine between a sample's normal and its face's for the tilt to count
 _STEPS = 4  # of conjugate gradients: each round starts near the answer, more change nothing
@@ -47,18 +48,23 @@ class Meeting(NamedTuple):
 class Equations:
     """The damped normal equations of values at vertices that are to be those of samples where these meet the faces.
 
-    They are kept as one symmetric 3 by 3 block a face.
+    They are kept as one symmetric 3 by 3 block a face. Where the values are places, `normals`, (3, m), are those of the
+    faces, zero for edges: steps along a face are held by a part only (Chen and Medioni 1992: point to plane).
     """
 
-    def __init__(self, vertices: Floats, faces: Ints, met: Meeting) -> None:
+    def __init__(self, vertices: Floats, faces: Ints, met: Meeting, normals: Floats | None = None) -> None:
         self._corners, self._size, self._met = np.ascontiguousarray(faces.T), len(vertices), met
+        self._normals = normals
+        self._kept = 1 if normals is None else np.where(normals.any(axis=0), _ALONG, 1)
         self._heavy = met.weights * met.places
         self._blocks = {(i, j): self._sums(self._heavy[i] * met.places[j]) for i in range(3) for j in range(i, 3)}
         # evenly spread samples would put a sixth of a face's weight on the diagonal of each of its corners
         share = lengths(face_area_vectors(vertices, faces))
         share *= met.weights.sum() / (6 * max(float(share.sum()), 1e-300))
         self._damping = _DAMPING * self.gather([share] * 3) + 1e-9
-        self.diagonal = self._damping + self.gather([self._blocks[i, i] for i in range(3)])
+        parts = np.ones((1, 1)) if normals is None else self._kept + (1 - self._kept) * normals * normals
+        self.diagonal = np.stack([self._damping + self.gather([self._blocks[i, i] * part for i in range(3)])
+                                  for part in parts])
 
     def _sums(self, values: Floats) -> Floats:
         return _sums(self._met.face, values, self._corners.shape[1])
@@ -79,40 +85,42 @@ class Equations:
 
     def times(self, step: Floats) -> Floats:
         """Return the matrix times a (c, k) step."""
-        out, blocks = self._damping * step, self._blocks
-        for row, total in zip(step, out, strict=True):
-            x, y, z = row.take(self._corners)
-            total += self.gather([blocks[0, 0] * x + blocks[0, 1] * y + blocks[0, 2] * z,
-                                  blocks[0, 1] * x + blocks[1, 1] * y + blocks[1, 2] * z,
-                                  blocks[0, 2] * x + blocks[1, 2] * y + blocks[2, 2] * z])
-        return out
+        x, y, z = np.moveaxis(step.take(self._corners, axis=1), 1, 0)
+        blocks = self._blocks
+        held = np.stack([blocks[0, 0] * x + blocks[0, 1] * y + blocks[0, 2] * z,
+                         blocks[0, 1] * x + blocks[1, 1] * y + blocks[1, 2] * z,
+                         blocks[0, 2] * x + blocks[1, 2] * y + blocks[2, 2] * z], axis=1)
+        if self._normals is not None:
+            across = np.einsum("cf,cnf->nf", self._normals, held) * (1 - self._kept)
+            held = self._kept * held + self._normals[:, None] * across
+        return self._damping * step + np.stack([self.gather(list(row)) for row in held])
 
     def best_values(self, values: Floats, wanted: Floats, free: Bools) -> Floats:
         """Return (c, k) values that fit (c, s) of the samples, from `values` on; only those that are free change."""
         pull = self.pull(values, wanted) * free
-        return values + _conjugate_gradients(lambda step: self.times(step) * free, pull, self.diagonal)
+        return values + _conjugate_gradients(lambda step: self.times(step) * free, pull, self.diagonal, axis=1)
 
 
 def best_step(vertices: Floats, faces: Ints, samples: Samples, face: Ints, places: Floats) -> Floats:
     """Return the (k, 3) step that brings the points at `places` of their faces near to the samples, level with them."""
-    equations = Equations(vertices, faces, Meeting(face, places, samples.weights))
+    normals = np.ascontiguousarray(face_normals(vertices, faces).T)
+    equations = Equations(vertices, faces, Meeting(face, places, samples.weights), normals)
     columns, corners = np.ascontiguousarray(vertices.T), np.ascontiguousarray(faces.T)
-    tilts = _tilts(vertices, faces, samples, face)
+    tilts = _tilts(normals, samples, face)
     pull = equations.pull(columns, samples.exact) - _tilt(tilts, columns, corners)
     rises = np.stack([equations.gather([2 * tilts[axis, axis]] * 3) for axis in range(3)])
     return _conjugate_gradients(lambda step: equations.times(step) + _tilt(tilts, step, corners), pull,
                                 equations.diagonal + rises).T
 
 
-def _tilts(vertices: Floats, faces: Ints, samples: Samples, face: Ints) -> Floats:
-    """Return (3, 3, m): outer products of the normals of each face's samples, where they agree with it, summed."""
+def _tilts(own: Floats, samples: Samples, face: Ints) -> Floats:
+    """Return (3, 3, m): outer products of the normals of each face's samples, where they agree with its, summed."""
     normals = samples.normals
-    own = np.ascontiguousarray(face_normals(vertices, faces).T)
     weights = np.where((own.take(face, axis=1) * normals).sum(axis=0) > _AGREE, _TILT * samples.weights, 0)
-    sums = np.empty((3, 3, len(faces)))
+    sums = np.empty((3, *own.shape))
     for i in range(3):
         for j in range(i, 3):
-            sums[i, j] = sums[j, i] = _sums(face, weights * normals[i] * normals[j], len(faces))
+            sums[i, j] = sums[j, i] = _sums(face, weights * normals[i] * normals[j], own.shape[1])
     return sums
 
 
@@ -138,19 +146,20 @@ def _sums(index: Ints, values: Floats, count: int) -> Floats:
     return np.bincount(index, values, minlength=count).astype(np.float64, copy=False)
 
 
-def _conjugate_gradients(apply: Callable[[Floats], Floats], right: Floats, diagonal: Floats) -> Floats:
-    """Return about the solution of a positive definite system, all right sides at once, from zero on."""
+def _conjugate_gradients(apply: Callable[[Floats], Floats], right: Floats, diagonal: Floats,
+                         axis: int | None = None) -> Floats:
+    """Return about the solution of a positive definite system from zero on; with axis 1 each row is one of its own."""
     answer, rest = np.zeros_like(right), right.copy()
     scaled = rest / diagonal
     direction = scaled.copy()
-    old = (rest * scaled).sum(axis=1, keepdims=True)
+    old = (rest * scaled).sum(axis=axis, keepdims=True)
     for _ in range(_STEPS):
         image = apply(direction)
-        length = old / np.maximum((direction * image).sum(axis=1, keepdims=True), 1e-300)
+        length = old / np.maximum((direction * image).sum(axis=axis, keepdims=True), 1e-300)
         answer += length * direction
         rest -= length * image
         scaled = rest / diagonal
-        new = (rest * scaled).sum(axis=1, keepdims=True)
+        new = (rest * scaled).sum(axis=axis, keepdims=True)
         direction = scaled + new / np.maximum(old, 1e-300) * direction
         old = new
     return answer
