@@ -69,6 +69,7 @@ class ClosestPoints:
         *,
         max_distance: float | None = None,
         hint: Ints | None = None,
+        enough: float | None = None,
     ) -> tuple[Floats, Ints, Floats]:
         """
         Return the closest surface point, its face and the squared distance for each point.
@@ -81,13 +82,16 @@ class ClosestPoints:
             Surface farther away than this is not looked at.
         hint
             (p,) a face for each point, thought to be near; -1 where nothing is known.
+        enough
+            A point known to be within this distance gets the surface point that tells so, not the closest: whoever
+            seeks the farthest points is soon done with the others.
 
         Returns
         -------
         closest, face, squared
             (p, 3) float64, (p,) int64 and (p,) float64; NaN, -1 and infinity where nothing lies within `max_distance`.
         """
-        steps = self.query_steps(points, max_distance=max_distance, hint=hint)
+        steps = self.query_steps(points, max_distance=max_distance, hint=hint, enough=enough)
         return run_to_end(steps)
 
     def query_steps(
@@ -96,16 +100,18 @@ class ClosestPoints:
         *,
         max_distance: float | None = None,
         hint: Ints | None = None,
+        enough: float | None = None,
     ) -> Generator[None, None, tuple[Floats, Ints, Floats]]:
         """Do what `query` does in steps: yields after each block of points, returns the answers, may be closed."""
         points = (np.asarray(points, dtype=np.float64) - self._center) / self._size
         squared = np.full(len(points), np.inf if max_distance is None else (max_distance / self._size) ** 2)
         slot = np.full(len(points), -1, dtype=np.int64)
         guess = None if hint is None else self._slots(np.asarray(hint, dtype=np.int64))
+        bound = -1.0 if enough is None else (enough / self._size) * (enough / self._size)
         for rows in _groups(points, self._faces):
             walk = _Walk(self._levels, self._frames, points.take(rows, axis=0), squared.take(rows))
             walk.start(None if guess is None else guess.take(rows))
-            walk.run()
+            walk.run(bound)
             squared[rows], slot[rows] = walk.squared, walk.slot
             yield
         return self._finish(points, slot)
@@ -175,9 +181,9 @@ class _Walk:
                 node, order = node[best, groups], order[best, groups]
         return np.minimum(node[order.argmin(axis=0), groups], self.leaf_frames.shape[2] - 1)
 
-    def run(self) -> None:
-        """Walk down from the root with every group."""
-        groups = np.arange(self.squared.shape[1])
+    def run(self, enough: float) -> None:
+        """Walk down from the root with every group that has a point not yet within a squared distance."""
+        groups = np.flatnonzero(self.squared.max(axis=0) > enough)
         self._descend(len(self.levels) - 1, groups, np.zeros(len(groups), dtype=np.int64))
 
     def _descend(self, level: int, group: Ints, node: Ints) -> None:

@@ -7,7 +7,6 @@ docs/decisions/max-error.md.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -24,12 +23,17 @@ from .sampling import edge_samples, face_samples
 
 _SEED = 1
 _SPREAD = 100_000  # points over the faces of each surface, and half as many along the edges
+_FEW = 10  # one of so many of these is looked up first: most levels that are beyond the limit fail by them
+_LITTLE = 0.5  # of the limit: how far nearer points are is not asked
 _NEAR = 0.8  # faces with a sample as far as this part of the farthest are looked at closely,
 _CLOSELY = 400  # at most so many of them,
 _STEPS = 12  # at points so many to a side
 _SAFE = 0.98  # the part of the limit that a thorough look may find: what it misses is less than the rest
 _USED = 0.8  # a level that uses this part of the limit is coarse enough
-_STRIDE = 0.04  # first step from where the probes point to, as a part of the triangles
+_AIM = 0.88  # the part that the guess after a fit aims at: distances go about with one over the triangles,
+_SWING = 2.0  # but by so many times fewer at most
+_STRIDE = 0.05  # more triangles after the first misfit, twice as many after each other: a maximum is mostly chance
+_GUESSES = 8  # then halving goes on
 
 
 def within(mesh: Prepared, record: CollapseRecord, original: Mesh, limit: float, options: Options,
@@ -51,33 +55,25 @@ def within(mesh: Prepared, record: CollapseRecord, original: Mesh, limit: float,
     """
     search = _Search(mesh, record, original, limit, options, carrier)
     low, high = 0, len(record) + 1  # fits; does not fit
-    best = search.at(0)
-    for length in search.first_guesses():
+    best, length, stride, guesses = search.at(0), search.first_guess(), _STRIDE, _GUESSES
+    while high - low > 1:
         if not low < length < high:
-            continue
-        found = search.judge(length)
-        if found is None:
-            high = length
+            length = (low + high) // 2
+        result = search.at(length)
+        used = search.used(result)
+        if used > _SAFE:
+            high, times, stride = length, 1 + stride, 2 * stride
         else:
-            low, best = length, found
-        if low and search.used >= _USED:
-            return best
-        if low and high <= len(record):
-            break
-    while high - low > 1 and search.used < _USED:
-        middle = (low + high) // 2
-        found = search.judge(middle)
-        if found is None:
-            high = middle
-        else:
-            low, best = middle, found
+            low, best, times = length, result, max(used / _AIM, 1 / _SWING)
+            if used >= _USED:
+                break
+        guesses -= 1
+        length = record.length_for(round(times * record.left(length))) if guesses > 0 else 0
     return best
 
 
 class _Search:
     """Levels of one record, judged by their distance."""
-
-    used = 0.0  # the part of the limit that the last level within it uses
 
     def __init__(self, mesh: Prepared, record: CollapseRecord, original: Mesh, limit: float, options: Options,
                  carrier: Carrier | None) -> None:
@@ -97,33 +93,29 @@ class _Search:
         spare = spare_of(self.record.left(length), self.options, self.carrier)
         return level(self.mesh, self.record, self.original, length, self.options, self.carrier, spare)
 
-    def first_guesses(self) -> Iterator[int]:
-        """Yield where probes of unfinished levels point to, then lengths in wider and wider steps on both sides."""
+    def first_guess(self) -> int:
+        """Return where probes of unfinished levels point to."""
         low, high = 0, len(self.record)
         while low < high:
             middle = (low + high + 1) // 2
-            if self.probes.deviation(self.at(middle, plain=True)) > self.limit:
+            if self.probes.deviation(self.at(middle, plain=True), self.limit) > self.limit:
                 high = middle - 1
             else:
                 low = middle
-        yield low
-        stride = max(int(_STRIDE * self.record.left(low) / 2), 1)
-        while stride < 2 * len(self.record):
-            yield min(low + stride, len(self.record))
-            yield max(low - stride, 0)
-            stride *= 2
+        return low
 
-    def judge(self, length: int) -> SimplifyResult | None:
-        """Return the level where it is within the limit."""
-        result = self.at(length)
+    def used(self, result: SimplifyResult) -> float:
+        """Return the part of the limit that a level uses: of one beyond it, any above one."""
         farthest = self._farthest(result)
-        if farthest > _SAFE * self.limit:
-            return None
-        self.used = farthest / self.limit if self.limit > 0 else 1.0
-        return result
+        if self.limit > 0:
+            return farthest / self.limit
+        return np.inf if farthest > 0 else 1.0
 
     def _farthest(self, result: SimplifyResult) -> float:
-        """Return the largest distance between both surfaces that a thorough look finds, or one beyond the limit."""
+        """Return the largest distance between both surfaces that a thorough look finds, or one beyond the limit.
+
+        Where it is below half of the limit, any such distance.
+        """
         vertices, faces = result.vertices, result.faces.astype(np.int64)
         faces = faces[face_areas(vertices, faces) > 0]
         if len(faces) == 0:
@@ -131,19 +123,20 @@ class _Search:
         end = (_SAFE * min(self.limit, 1e150)) ** 2  # of a longer one there is no square
         there, back = ClosestPoints(vertices, faces), self.probes.surface
         corners = vertices.take(np.unique(faces), axis=0)
-        worst = 0.0
-        for search, points in ((there, self.probes.points), (back, corners), (there, self.vertices)):
-            worst = max(worst, float(search.query(points)[2].max(initial=0.0)))
+        worst, little = 0.0, _LITTLE * self.limit
+        spread, face = _spread(vertices, faces)
+        for search, points in ((there, self.probes.points), (back, corners), (there, self.vertices),
+                               (there, self.spread[::_FEW]), (back, spread[::_FEW])):
+            worst = max(worst, float(search.query(points, enough=little)[2].max(initial=0.0)))
             if worst > end:
                 return float(np.sqrt(worst))
-        points, face = _spread(vertices, faces)
         for search, source, some, of in ((there, self.closely, self.spread, self.face),
-                                         (back, (vertices, faces), points, face)):
-            squared = search.query(some)[2]
+                                         (back, (vertices, faces), spread, face)):
+            squared = search.query(some, enough=little)[2]
             worst = max(worst, float(squared.max(initial=0.0)))
             if worst > end:
                 break
-            squared = search.query(_close_up(*source, squared[: len(of)], of, worst))[2]
+            squared = search.query(_close_up(*source, squared[: len(of)], of, worst), enough=little)[2]
             worst = max(worst, float(squared.max(initial=0.0)))
         return float(np.sqrt(worst))
 

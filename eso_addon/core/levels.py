@@ -173,13 +173,13 @@ class Probes:
         self.surface = ClosestPoints(vertices, faces)
         self.points = _thin(np.concatenate((vertices[np.unique(faces)], vertices[faces].mean(axis=1))))
 
-    def deviation(self, level: SimplifyResult) -> float:
-        """Return the largest distance that the probes find, either way."""
+    def deviation(self, level: SimplifyResult, enough: float | None = None) -> float:
+        """Return the largest distance that the probes find, either way; where it is below `enough`, one below that."""
         corners = level.vertices[level.faces]
         middles = (corners + np.roll(corners, 1, axis=1)).reshape(-1, 3) / 2
         points = _thin(np.concatenate((level.vertices, corners.mean(axis=1), middles)))
-        _, _, forward = ClosestPoints(level.vertices, level.faces.astype(np.int64)).query(self.points)
-        _, _, backward = self.surface.query(points)
+        _, _, forward = ClosestPoints(level.vertices, level.faces.astype(np.int64)).query(self.points, enough=enough)
+        _, _, backward = self.surface.query(points, enough=enough)
         return float(np.sqrt(max(forward.max(initial=0.0), backward.max(initial=0.0))))
 
 

@@ -114,3 +114,19 @@ def test_no_points_and_no_faces() -> None:
     assert face.shape == squared.shape == (0,)
     with pytest.raises(ValueError, match="no faces"):
         ClosestPoints(vertices, np.zeros((0, 3), dtype=np.int64))
+
+
+def test_what_is_near_enough_is_not_looked_into() -> None:
+    rng = np.random.default_rng(5)
+    vertices, faces = rng.normal(size=(60, 3)), rng.integers(0, 60, (200, 3))
+    points = rng.normal(size=(3000, 3)) * 2
+    search = ClosestPoints(vertices, faces)
+    exact = search.query(points)[2]
+    for enough in (0.0, 0.3, 1.0, 1e200):
+        closest, face, squared = search.query(points, enough=enough)
+        far = exact > enough * enough
+        np.testing.assert_allclose(squared[far], exact[far], rtol=1e-12)
+        assert (squared[~far] >= exact[~far] * (1 - 1e-12)).all()
+        assert (squared[~far] <= enough * enough * (1 + 1e-12)).all()
+        assert (face >= 0).all()
+        assert np.isfinite(closest).all()
