@@ -9,7 +9,7 @@ from typing import TypeVar
 Result = TypeVar("Result")
 
 # faces from which on a second thread pays: below, its share of each call is too short to get Python's lock in time
-_MANY = 250_000
+_MANY = 200_000
 
 
 class Blocks:

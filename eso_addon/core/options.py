@@ -74,7 +74,7 @@ class Options:
     symmetry : str
         "x", "y" or "z" for a symmetric result of a mesh that is symmetric across this axis, or "none".
     threads : int, optional
-        Where not given, two for meshes of at least 250,000 triangles, else one. The result does not depend on it.
+        Where not given, two for meshes of at least 200,000 triangles, else one. The result does not depend on it.
     """
 
     method: str = "eso"
