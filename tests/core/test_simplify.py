@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import Phase, assume, given, settings
+from hypothesis import Phase, assume, example, given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
@@ -78,6 +78,7 @@ def shared_places(vertices: Floats, faces: Ints, loose: Ints) -> bool:
 
 @QUICK
 @given(SEEDS, st.floats(0.02, 1.0), OPTIONS)
+@example(233191, 0.15, {"preset": "paper"})
 def test_manifolds_reach_the_count_or_say_so(seed: int, ratio: float, options: dict[str, Any]) -> None:
     vertices, faces = shapes.manifold(seed)
     target = max(round(len(faces) * ratio), 1)
@@ -86,7 +87,9 @@ def test_manifolds_reach_the_count_or_say_so(seed: int, ratio: float, options: d
     left = len(result.faces)
     assert result.reached == (left <= target)
     if result.reached:
-        assert left in (target, target - 1)
+        # as the papers print it nothing guards the topology: a collapse may take more than two triangles
+        before = result.record.left(max(result.record.length_for(target) - 1, 0))
+        assert left in (target, target - 1) or (options.get("preset") == "paper" and before > target >= left)
         assert not result.messages
     else:
         assert f"stopped at {left} of {target}" in result.messages[-1]
