@@ -105,7 +105,7 @@ class _Search:
         return low
 
     def used(self, result: SimplifyResult) -> float:
-        """Return the part of the limit that a level uses: of one beyond it, any above one."""
+        """Return the part of the limit that a level uses: of one beyond what is safe, any beyond that."""
         farthest = self._farthest(result)
         if self.limit > 0:
             return farthest / self.limit

@@ -111,8 +111,7 @@ def edge_curvature_factor(defects: Floats, areas: Floats, edges: Ints) -> Floats
     return np.divide(turn, area, out=np.zeros_like(area), where=area > 0.0)
 
 
-def surface_variation(vertices: Floats, faces: Ints, rings: int,
-                      area_vectors: Floats | None = None) -> Floats:
+def surface_variation(vertices: Floats, faces: Ints, rings: int, area_vectors: Floats | None = None) -> Floats:
     """Return the extended shape operator S of each vertex (Equation 8; with one ring Equation 7).
 
     S is the sum of the differences of unit normals between a vertex and all vertices within so many rings,
@@ -132,7 +131,6 @@ def surface_variation(vertices: Floats, faces: Ints, rings: int,
     count = len(vertices)
     offsets, neighbours = one_rings(faces, count)
     positions, normals = _rows_of_four(vertices), _rows_of_four(vertex_normals(vertices, faces, area_vectors))
-
     turns, ways = np.zeros(count), np.zeros(count)
     for pairs in near_pairs(offsets, neighbours, rings):
         _add_distances(turns, normals, pairs)
