@@ -186,8 +186,7 @@ def scene_long_work() -> Steps:
     figures = {f"p{part}": 1000 * float(np.percentile(gaps, part)) for part in (50, 95, 99)}
     FIGURES["milliseconds between modal timer calls"] = {**figures, "max": 1000 * float(gaps.max()), "n": len(gaps),
                                                        "cores that other processes had": round(float(others), 2)}
-    # a machine that is busy with something else says nothing about the add-on
-    assert figures["p95"] <= 50 or others > 0.5, FIGURES["milliseconds between modal timer calls"]
+    assert figures["p95"] <= 50, FIGURES["milliseconds between modal timer calls"]
 
 
 def scene_redo() -> Steps:
