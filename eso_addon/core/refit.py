@@ -26,6 +26,7 @@ _ROUNDS = 5
 _PER_FACE = 10
 _LEAST = 5000  # and at least so many in all: they are soon done, and miss nothing of a small mesh
 _SINGLE = 1e-5  # rounding of squared distances in single precision
+_ROUNDING = 5e-7  # of distances in single precision, in a mesh of unit size
 _NOTHING = 1e-7  # of a step that single precision may have made: straight borders along an axis stay straight
 _FAR = 9.0  # times the median squared distance
 _BLOCK = 8192
@@ -313,9 +314,8 @@ def _first_faces(vertices: Floats, faces: Ints, points: Floats, survivor: Ints |
             place = np.arange(ends[-1]) + np.repeat(offsets.take(survivor[rows]) - ends + size, size)
             candidate = star.take(place)
             squared = squared_distances(frames.take(candidate, axis=1), points.take(np.repeat(rows, size), axis=1))
-            least = np.repeat(np.minimum.reduceat(squared, ends - size), size)
-            won = np.flatnonzero(squared == least)
-            face[np.repeat(rows, size).take(won)] = candidate.take(won)
+            far = squared > np.repeat(_as_near(np.minimum.reduceat(squared, ends - size)), size)
+            face[rows] = np.minimum.reduceat(np.where(far, len(faces), candidate), ends - size)
     rest = np.flatnonzero(~known)
     if len(rest):
         face[rest] = ClosestPoints(vertices, faces).query(points.take(rest, axis=1).T)[1]
@@ -325,7 +325,7 @@ def _first_faces(vertices: Floats, faces: Ints, points: Floats, survivor: Ints |
 def _correspond(
     vertices: Floats, faces: Ints, points: Floats, face: Ints, neighbors: Ints
 ) -> tuple[Ints, Floats, Floats]:
-    """Return the best of each sample's face and the faces across its sides, the squared distance and closest point.
+    """Return the nearest of each sample's face and the faces across its sides, the squared distance and closest point.
 
     The surface moves little between rounds: one step to a neighbour follows it at a tenth of a full search.
     """
@@ -336,15 +336,25 @@ def _correspond(
         here, local = best[part], points[:, part]
         nearest, squared, outside = closest_in_triangles(frames.take(here, axis=1), local)
         rows = np.flatnonzero(outside)
-        candidates = neighbors.take(here.take(rows), axis=1)
-        across = squared_distances(frames.take(candidates, axis=1), local.take(rows, axis=1)[:, None])
-        choice = across.argmin(axis=0)
-        better = across.min(axis=0) < squared.take(rows)
-        rows, moved = rows[better], candidates[choice, np.arange(len(rows))][better]
+        present = here.take(rows)
+        candidates = np.concatenate((present[None], neighbors.take(present, axis=1)))
+        across = squared_distances(frames.take(candidates[1:], axis=1), local.take(rows, axis=1)[:, None])
+        gaps = np.concatenate((squared.take(rows)[None], across))
+        first = np.where(gaps > _as_near(gaps.min(axis=0)), len(faces), candidates).min(axis=0)
+        moves = np.flatnonzero(first != present)
+        rows, moved = rows.take(moves), first.take(moves)
         here[rows] = moved
         nearest[:, rows], squared[rows], _ = closest_in_triangles(frames.take(moved, axis=1), local.take(rows, axis=1))
         closest[:, part], distance[part] = nearest, squared
     return best, distance, closest
+
+
+def _as_near(squared: Floats) -> Floats:
+    """Return the squared distances that are no larger but for rounding.
+
+    Faces are equally near to a sample above their edge: it takes the first of them, so that rounding decides nothing.
+    """
+    return (np.sqrt(squared) + _ROUNDING) ** 2
 
 
 def _face_neighbors(faces: Ints, vertex_count: int) -> Ints:
