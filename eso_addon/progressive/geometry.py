@@ -6,6 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..core.mesh import Ints
 from .coder import CLASSES, Reader, Writer, code_numbers, size_class
@@ -61,14 +62,17 @@ class Grid:
 
 def place_of(values: np.ndarray) -> Ints:
     """Return the place of float32 numbers in their order, as int64: all bit patterns are told apart."""
-    bits = np.ascontiguousarray(values, np.float32).view(np.int32).astype(np.int64)
-    return np.where(bits >= 0, bits, -1 - (bits & 0x7FFFFFFF))
+    return _reflected(np.ascontiguousarray(values, np.float32).view(np.int32)).astype(np.int64)
 
 
 def float_at(places: Ints) -> np.ndarray:
     """Return the float32 numbers at places in their order."""
-    bits = np.where(places >= 0, places, (-1 - places) | 0x80000000)
-    return (bits & 0xFFFFFFFF).astype(np.uint32).view(np.float32)
+    return _reflected(places.astype(np.int32)).view(np.float32)
+
+
+def _reflected(bits: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Turn the order of negative numbers around: of floats' bits it makes places, and of places the bits."""
+    return bits ^ ((bits >> 31) & 0x7FFFFFFF)
 
 
 class Shape:

@@ -155,6 +155,8 @@ class _Codec:
 
     def _moved_wedges(self, block: ColumnWriter | ColumnReader, done: Done, faces_before: int) -> None:
         """Code the wedges of corners that changed vertex and of new faces."""
+        if not self.wedged:
+            return
         mesh, patches = self.mesh, self.patches
         rows, faces = done.slot // max(faces_before, 1), done.slot % max(faces_before, 1)
         new = np.arange(faces_before, mesh.face_count)
@@ -177,8 +179,6 @@ class _Codec:
 
     def _code_wedges(self, block: ColumnWriter | ColumnReader, corners: Ints, wedges: Ints, rows: Ints, faces: Ints,
                      starts: Ints) -> None:
-        if not self.wedged:
-            return
         place = corners[rows, faces]
         size = starts.take(place + 1) - starts.take(place)
         several = np.flatnonzero(size > 1)
