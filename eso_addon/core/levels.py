@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from .carrier import Carrier
 from .closest import ClosestPoints
+from .curves import into_planes
 from .mesh import Floats, Ints
 from .options import Options
 from .prepare import Prepared
@@ -95,12 +96,15 @@ def level(mesh: Prepared, record: CollapseRecord, original: Mesh, length: int,
     number[alive] = np.arange(len(alive))
     corners, placed = number.take(corners), points.take(alive, axis=0)
     merged = number.take(survivor)  # of the engine's vertices
+    held = np.zeros((len(placed), 3), bool)
+    if options.moves and length:
+        placed, held = into_planes(placed, corners, vertices[mesh.source].T, _borders(mesh, options), merged)
     fitted = Refitted.unfitted(placed, corners)
     if options.refit and options.moves and length:
         # the engine's vertices stand for the input's, so that seams stay closed
         fitted = refit(
             placed, corners, vertices[mesh.source], mesh.faces.T, vertex_map=merged,
-            fixed=None if carrier is None else carrier.held(merged, len(placed)),
+            fixed=held if carrier is None else held | carrier.held(merged, len(placed))[:, None],
             bound=None if carrier is None else carrier.bound(merged, len(placed)),
             group=_sheets(mesh, faces, face_map) if carrier is None else carrier.sheets(face_map),
             flips=options.flips and (carrier is None or carrier.flips), spare=spare,
@@ -134,8 +138,13 @@ def spare_of(count: int, options: Options, carrier: Carrier | None) -> int:
 
 def _line_edges(mesh: Prepared, options: Options, carrier: Carrier | None) -> Ints:
     """Return the engine's edges, (2, l) int64, that a refit follows: open boundaries and lines."""
-    boundary = np.zeros((2, 0), np.int64) if options.boundary_lines == "ignored" else mesh.boundary_edges
-    return boundary if carrier is None else np.concatenate((boundary, carrier.line_edges), axis=1)
+    borders = _borders(mesh, options)
+    return borders if carrier is None else np.concatenate((borders, carrier.line_edges), axis=1)
+
+
+def _borders(mesh: Prepared, options: Options) -> Ints:
+    """Return the engine's edges, (2, l) int64, of open borders that shall stay where they are."""
+    return np.zeros((2, 0), np.int64) if options.boundary_lines == "ignored" else mesh.boundary_edges
 
 
 def _sheets(mesh: Prepared, input_faces: Ints, face_map: Ints) -> Ints | None:

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .mesh import Floats, Ints
+from .mesh import Bools, Floats, Ints
 
 # rows of a matrix, or a list of them
 Components = np.ndarray | Sequence[np.ndarray]
@@ -94,6 +94,19 @@ def boundary_quadrics(points: Floats, normals: Floats, edges: Ints, weight: floa
     parts = np.empty((6, points.shape[1]))
     for part, (i, j) in zip(parts, PAIRS, strict=True):
         part[:] = np.bincount(edges.ravel(), np.tile(weight * across[i] * across[j], 2), points.shape[1])
+    return parts
+
+
+def axis_plane_quadrics(points: Floats, planar: Bools, edges: Ints, weight: float) -> Floats:
+    """Planes of two axes in which boundary edges lie, summed at both ends; arguments and result as above.
+
+    `planar`, (3, b) bool, tells along which axes an edge is planar.
+    """
+    along = points[:, edges[1]] - points[:, edges[0]]
+    squared = weight * (along * along).sum(axis=0)
+    parts = np.zeros((6, points.shape[1]))
+    for place, flags in zip(_DIAGONAL, planar, strict=True):
+        parts[place] = np.bincount(edges.ravel(), np.tile(squared * flags, 2), points.shape[1])
     return parts
 
 

@@ -84,8 +84,8 @@ def refit(vertices: Floats, faces: Ints, original_vertices: Floats, original_fac
         What it came from.
     vertex_map : (n,) int64, optional
         The simplified vertex each original vertex was collapsed into, -1 if none: spares a search over the mesh.
-    fixed : (k,) bool, optional
-        Vertices that must stay; boundary vertices do too, unless they are on lines.
+    fixed : (k,) or (k, 3) bool, optional
+        Vertices, or coordinates of them, that must stay; boundary vertices do too, unless they are on lines.
     bound, group : optional
         Edges that must stay: see `flips.flip_edges`.
     rounds : int
@@ -102,8 +102,9 @@ def refit(vertices: Floats, faces: Ints, original_vertices: Floats, original_fac
     if lines is not None and vertex_map is not None:
         ends = vertex_map.take(lines)
         held[ends[ends >= 0]] = False
+    held = np.repeat(held[:, None], 3, axis=1)
     if fixed is not None:
-        held |= fixed
+        held |= fixed.reshape(len(fixed), -1)
     flat = not face_area_vectors(original_vertices, original_faces).any()
     if len(faces) == 0 or rounds < 1 or flat or (held.all() and not flips):
         return Refitted.unfitted(vertices.copy(), faces)
@@ -117,7 +118,7 @@ def refit(vertices: Floats, faces: Ints, original_vertices: Floats, original_fac
         if flips and done < rounds - 1:
             fit.flip()
     moved = fit.vertices
-    placed = np.where((moved == start).all(axis=1)[:, None], vertices, moved * size + center)
+    placed = np.where(moved == start, vertices, moved * size + center)
     return Refitted(placed, fit.faces, fit.corner, back, fit.samples.face, fit.met())
 
 
@@ -254,7 +255,7 @@ class _Fit:
                         self.face[some], weights, wanted, self._free_sides())
         new = np.zeros(len(made.chosen), bool)
         self.vertices = np.concatenate((self.vertices, self.samples.exact[:, made.chosen].T))
-        self.held = np.concatenate((self.held, new))
+        self.held = np.concatenate((self.held, np.zeros((len(new), 3), bool)))
         if self.bound is not None:
             self.bound = np.concatenate((self.bound, new))
         if self.group is not None:

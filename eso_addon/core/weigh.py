@@ -4,16 +4,19 @@
 import numpy as np
 
 from .attribute_quadrics import with_attributes
+from .curves import planar_edges
 from .guidance import Guidance
 from .lines import MATERIAL, Lines
 from .mesh import Floats
 from .options import Options
 from .prepare import Prepared
-from .quadrics import anchored, area_normals, boundary_quadrics, plane_quadrics
+from .quadrics import anchored, area_normals, axis_plane_quadrics, boundary_quadrics, plane_quadrics
 from .variation import surface_variation
 
 # a border of materials is seen at once, a seam only where the texture differs across it
 _BORDER = 10.0
+# what is mirrored or set side by side at a plane shows every gap
+_PLANAR = 100.0
 # least weight of all: planes of none could not be solved
 _LEAST = 1e-6
 
@@ -42,6 +45,8 @@ def initial_quadrics(mesh: Prepared, options: Options, guidance: Guidance | None
         face = sides % mesh.faces.shape[1]
         parts += boundary_quadrics(mesh.points, normals.take(face, axis=1) / np.maximum(areas.take(face), 1e-300),
                                    mesh.boundary_edges, options.boundary_weight)
+        parts += axis_plane_quadrics(mesh.points, planar_edges(mesh.points, mesh.boundary_edges), mesh.boundary_edges,
+                                     _PLANAR * options.boundary_weight)
     if guidance is not None and guidance.lines is not None and options.line_weight > 0:
         parts += line_quadrics(mesh.points, guidance.lines, options.line_weight)
     if options.method in ("so", "eso"):

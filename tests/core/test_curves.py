@@ -5,6 +5,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from eso_addon.core.adjacency import boundary_vertices
 from eso_addon.core.curves import Curves
 from eso_addon.core.refit import refit
 from eso_addon.core.simplify import simplify
@@ -89,3 +90,16 @@ def test_a_straight_rim_stays_straight_and_locked_lines_stay() -> None:
     locked = simplify(bumpy, faces, ratio=0.3, boundary_lines="locked").vertices
     rim = bumpy[np.unique(outline(bumpy, faces))]
     assert {row.tobytes() for row in rim} <= {row.tobytes() for row in locked}
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.floats(0.03, 0.6), st.sampled_from([0.0, 0.02, 0.2]))
+def test_borders_in_a_plane_of_two_axes_stay_in_it(seed: int, ratio: float, rough: float) -> None:
+    """Mirrored halves and tiles of a landscape must still fit."""
+    rng = np.random.default_rng(seed)
+    vertices, faces = sheet(24, 24)
+    x, y = vertices[:, 0] / vertices[:, 0].max(), vertices[:, 1] / vertices[:, 1].max()
+    z = 0.2 * np.sin(rng.uniform(2, 9) * x + rng.uniform(0, 6)) * np.cos(rng.uniform(2, 9) * y)
+    result = simplify(np.column_stack((x, y, z + rough * rng.random(len(x)))), faces, ratio=ratio)
+    on_border = result.vertices[boundary_vertices(result.faces, len(result.vertices)), :2]
+    assert ((on_border == 0) | (on_border == 1)).any(axis=1).all()
