@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The record of one run of the engine: every collapse in order, from which any level is a prefix."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 
 import numpy as np
@@ -51,6 +53,12 @@ class CollapseRecord:
     def left(self, length: int) -> int:
         """Return how many triangles so many collapses leave."""
         return int(self.faces_left[length - 1]) if length else self.faces_before
+
+    def first(self, length: int) -> CollapseRecord:
+        """Return the record of the first collapses alone."""
+        return CollapseRecord(self.removed[:length], self.kept[:length], self.position[:length], self.faces_left[:length],
+                              self.cost[:length], self.batch_starts[self.batch_starts < length], self.faces_before,
+                              self.stays[:length])
 
     def survivors(self, vertex_count: int, length: int) -> Ints:
         """Return the vertex that each vertex has become after `length` collapses: (n,) int64."""

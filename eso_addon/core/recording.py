@@ -7,6 +7,8 @@ from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
+import numpy as np
+
 from .blocks import Blocks
 from .carrier import Carrier
 from .collapse import collapse_steps
@@ -112,7 +114,8 @@ def recording_steps(original: Mesh, options: Options, least: int) -> Generator[f
         record = yield from scaled(run, lambda left: 0.12 + 0.88 * (1 - (left - last) / total))
     finally:
         blocks.close()
-    record = in_input_units(record, mesh, vertices)
+    some = int(np.count_nonzero(record.faces_left))  # where nothing guards the topology, all may go: that is no mesh
+    record = in_input_units(record.first(some), mesh, vertices)
     if mirror is not None:  # each collapse stands for two
         record = replace(record, faces_before=2 * record.faces_before + rest,
                          faces_left=2 * record.faces_left + rest)

@@ -46,3 +46,16 @@ def test_the_default_loses_less(cow: Mesh) -> None:
     means = [[measure(*cow, level.vertices, level.faces, samples=10_000).symmetric.mean
               for level in lod_chain(*cow, faces_targets=counts, preset=preset)] for preset in ("default", "paper")]
     assert np.prod(means[0]) < 0.8 * np.prod(means[1])
+
+
+@pytest.mark.parametrize("apart", [[], [[1.0, 0, 0]]])
+@pytest.mark.parametrize("goal", [{"faces_target": 1}, {"max_error": 5.0}])
+def test_something_is_always_left(apart: list, goal: dict) -> None:
+    """Nothing guards the topology there: all triangles of a closed part could go."""
+    corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]])
+    sides = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
+    vertices = np.concatenate([corners, *(corners + offset for offset in apart)])
+    faces = np.concatenate([sides + 4 * part for part in range(1 + len(apart))])
+    result = simplify(vertices, faces, preset="paper", **goal)
+    assert len(result.faces) == 2 and 0 < result.error < 1
+    assert result.reached == ("max_error" in goal)
