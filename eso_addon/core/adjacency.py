@@ -169,6 +169,22 @@ def rings_of_edges(edges: Ints, vertex_count: int) -> tuple[Ints, Ints]:
     return offsets, neighbours
 
 
+def face_neighbors(faces: Ints, vertex_count: int) -> Ints:
+    """Return the face across each side of each face: (3, m) int64, side i from corner i to the next one.
+
+    At a boundary it is the face itself, at an edge of several faces one of the others.
+    """
+    begin, end = faces.T.ravel(), np.roll(faces, -1, axis=1).T.ravel()
+    keys = np.minimum(begin, end) * vertex_count + np.maximum(begin, end)
+    order = sorting_order(keys)
+    keys = keys.take(order)
+    same = keys[1:] == keys[:-1]
+    before, after = order[:-1][same], order[1:][same]
+    neighbors = np.tile(np.arange(len(faces)), 3)
+    neighbors[before], neighbors[after] = after % len(faces), before % len(faces)
+    return neighbors.reshape(3, -1)
+
+
 def stars(faces: Ints, vertex_count: int) -> tuple[Ints, Ints]:
     """Return the faces around each vertex, as CSR.
 

@@ -30,8 +30,9 @@ class ClosestPoints:
     """
     Exact closest points on a triangle mesh.
 
-    Triangles are laid along a Morton curve, four to a leaf and four nodes to a parent. The points are laid along the
-    same curve; groups of neighbours drop to a near leaf for a first bound, then walk down the tree together.
+    Triangles are halved again and again across their longest extent, down to four in a leaf; four nodes have a parent.
+    The points are laid along a Morton curve; groups of neighbours drop to a near leaf for a first bound, then walk down
+    the tree together.
 
     Parameters
     ----------

@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .adjacency import sorting_order
+from .adjacency import face_neighbors
 from .closest import ClosestPoints
 from .mesh import MeshError, check_mesh, weld
 from .normals import face_area_vectors, lengths
@@ -176,28 +176,14 @@ def _best_cosine(normal: Floats, closest: Floats, hit: Ints, target: _Surface, t
     Where a closest point lies on an edge the choice between its faces hangs on rounding: the better one counts.
     """
     cosine = np.einsum("ij,ij->i", normal, target.normals.take(hit, axis=0))
-    neighbors = _neighbors(target.faces, len(target.vertices))
+    neighbors = face_neighbors(target.faces, len(target.vertices))
     corners = target.faces.take(hit, axis=0)
     for side in range(3):
         start = target.vertices.take(corners[:, side], axis=0)
         along = target.vertices.take(corners[:, (side + 1) % 3], axis=0) - start
         off = np.cross(along, closest - start)
         on_edge = np.einsum("ij,ij->i", off, off) <= tie**2 * np.einsum("ij,ij->i", along, along)
-        neighbor = neighbors[:, side].take(hit)
-        rows = np.flatnonzero(on_edge & (neighbor >= 0))
-        across = target.normals.take(neighbor[rows], axis=0)
+        rows = np.flatnonzero(on_edge)
+        across = target.normals.take(neighbors[side].take(hit.take(rows)), axis=0)
         cosine[rows] = np.maximum(cosine[rows], np.einsum("ij,ij->i", normal[rows], across))
     return cosine
-
-
-def _neighbors(faces: Ints, vertex_count: int) -> Ints:
-    """Return (m, 3): the face across each side, -1 at boundaries, one of the others at a non-manifold edge."""
-    start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
-    keys = np.minimum(start, end) * vertex_count + np.maximum(start, end)
-    order = sorting_order(keys)
-    keys = keys.take(order)
-    same = keys[1:] == keys[:-1]
-    before, after = order[:-1][same], order[1:][same]
-    neighbor = np.full(len(keys), -1, dtype=np.int64)
-    neighbor[before], neighbor[after] = after // 3, before // 3
-    return neighbor.reshape(-1, 3)

@@ -15,7 +15,6 @@ from .mesh import Bools, Ints
 from .prepare import Prepared
 
 SEAM, MATERIAL, SHARP = 1, 2, 4
-NAMES = {SEAM: "seams", MATERIAL: "material borders", SHARP: "sharp edges"}
 # two values at a corner are one where they differ by less than this part of the layer's range
 _NEAR = {"uv": 1e-5, "color": 0.02, "value": 1e-3}
 # normals closer than five degrees are one

@@ -56,8 +56,9 @@ class CollapseRecord:
 
     def first(self, length: int) -> CollapseRecord:
         """Return the record of the first collapses alone."""
-        return CollapseRecord(self.removed[:length], self.kept[:length], self.position[:length], self.faces_left[:length],
-                              self.cost[:length], self.batch_starts[self.batch_starts < length], self.faces_before,
+        starts = self.batch_starts[self.batch_starts < length]
+        return CollapseRecord(self.removed[:length], self.kept[:length], self.position[:length],
+                              self.faces_left[:length], self.cost[:length], starts, self.faces_before,
                               self.stays[:length])
 
     def survivors(self, vertex_count: int, length: int) -> Ints:

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
-from typing import TypeVar
 
 import numpy as np
 
@@ -22,8 +21,6 @@ from .record import CollapseRecord
 from .steps import scaled
 from .symmetry import mirror_of
 from .weigh import initial_quadrics
-
-Value = TypeVar("Value")
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .adjacency import boundary_vertices, sorting_order, stars
+from .adjacency import boundary_vertices, face_neighbors, stars
 from .closest import ClosestPoints, closest_in_triangles, squared_distances, triangle_frames
 from .curves import Curves
 from .flips import flip_edges
@@ -179,7 +179,7 @@ class _Fit:
         self.group: Ints | None = None
         self.fresh: Bools | None = None  # faces that the last flips made; edges of others were no better flipped
         self.start = vertices  # since the last flips: what faces turn against
-        self.neighbors = _face_neighbors(faces, len(vertices))
+        self.neighbors = face_neighbors(faces, len(vertices))
         self.squared, self.closest = np.empty(len(face)), np.empty_like(samples.points)
         self._look()
         # a guess goes wrong over long triangles and sharp edges: samples that seem far away are looked up exactly
@@ -286,7 +286,7 @@ class _Fit:
             return ~kept
         self.faces, self.corner = faces, self.corner.ravel().take(corner)
         self.start = self.vertices
-        self.neighbors = _face_neighbors(faces, len(self.vertices))
+        self.neighbors = face_neighbors(faces, len(self.vertices))
         self._look(self._beside(~kept))
         return ~kept
 
@@ -356,19 +356,6 @@ def _as_near(squared: Floats) -> Floats:
     Faces are equally near to a sample above their edge: it takes the first of them, so that rounding decides nothing.
     """
     return (np.sqrt(squared) + _ROUNDING) ** 2
-
-
-def _face_neighbors(faces: Ints, vertex_count: int) -> Ints:
-    """Return (3, m): the face across each side, the face itself where there is none."""
-    begin, end = faces.T.ravel(), np.roll(faces, -1, axis=1).T.ravel()
-    keys = np.minimum(begin, end) * vertex_count + np.maximum(begin, end)
-    order = sorting_order(keys)
-    keys = keys.take(order)
-    same = keys[1:] == keys[:-1]
-    before, after = order[:-1][same], order[1:][same]
-    neighbors = np.tile(np.arange(len(faces)), 3)
-    neighbors[before], neighbors[after] = after % len(faces), before % len(faces)
-    return neighbors.reshape(3, -1)
 
 
 def _barycentric(vertices: Floats, faces: Ints, face: Ints, points: Floats) -> Floats:

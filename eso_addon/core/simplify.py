@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Generator, Sequence
-from typing import Any, TypeVar
+from typing import Any
 
 from numpy.typing import ArrayLike
 
@@ -13,8 +13,6 @@ from .mesh import check_mesh
 from .options import options_of, targets_of
 from .recording import recording_steps
 from .steps import run_to_end, scaled
-
-Value = TypeVar("Value")
 
 
 def simplify(vertices: ArrayLike, faces: ArrayLike, *, ratio: float | None = None, faces_target: int | None = None,
