@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import base64
 import html
+import json
 import os
 import re
 import zlib
@@ -16,6 +17,7 @@ from .client_files import CLIENT
 _THREE = ("three.core.js", "three.module.js")
 _IMPORT = re.compile(r"^import (?:\{([^}]*)\} from )?'\./([\w.]+)';\n", flags=re.MULTILINE)
 _LATER = re.compile(r"import\('\./([\w.]+)'\)")
+_TEXT = re.compile(r"await \(await fetch\(new URL\('\./([\w.]+)', import\.meta\.url\)\)\)\.text\(\)")
 _EXPORT = re.compile(r"^export (?=(?:async )?(?:function|class|const) (\w+))", flags=re.MULTILINE)
 _MAGIC = b"\x89ESOPM\r\n"
 
@@ -115,5 +117,6 @@ def _collect(name: str, parts: dict[str, str]) -> None:
         _collect(needed, parts)
     names = ", ".join(_EXPORT.findall(text))
     body = _IMPORT.sub(lambda found: f"const {{{found[1]}}} = modules['{found[2]}'];\n" if found[1] else "", text)
+    body = _TEXT.sub(lambda found: json.dumps((CLIENT / found[1]).read_text(encoding="utf-8")), body)
     body = _EXPORT.sub("", _LATER.sub(r"modules['\1']", body))
     parts[name] = f"modules['{name}'] = (() => {{\n{body}return {{ {names} }};\n}})();\n"

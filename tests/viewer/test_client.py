@@ -76,7 +76,7 @@ def test_levels_back_and_forth(page: Page, site: Start, torus: Path) -> None:
     until(page, "s.identical && s.shown === s.faces")
     page.locator("eso-viewer >> css=.base").click()
     assert until(page, "s.shown < s.faces")["shown"] == base
-    page.locator("eso-viewer >> css=.level").fill("500")
+    page.locator("eso-viewer >> css=.level").fill("0.5")
     shown = until(page, f"s.shown > {base} && s.shown < s.faces")["shown"]
     assert shown == pytest.approx((base * 5000) ** 0.5, rel=0.02)
     assert "level of" in words(page, ".state")

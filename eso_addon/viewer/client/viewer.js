@@ -71,10 +71,7 @@ function begin(element) {
   let looking;
   let telling;
 
-  const panel = makePanel(element.shadowRoot ?? element.attachShadow({ mode: 'open' }), {
-    play: () => pause(!settings.paused), again, level, set,
-    wire: () => wire(!settings.wire),
-  });
+  const panel = makePanel(element.shadowRoot ?? element.attachShadow({ mode: 'open' }), set, again);
   Object.assign(element, {
     level, pause, wire, set, again, dump,
     close() {
