@@ -41,7 +41,6 @@ _KINDS = {".js": "text/javascript", ".html": "text/html", ".wasm": "application/
 
 COVERED = """() => {
   const { view } = document.querySelector('eso-viewer');
-  view.aim();
   view.renderer.render(view.scene, view.camera);
   const gl = view.renderer.getContext();
   const [w, h] = [gl.drawingBufferWidth, gl.drawingBufferHeight];

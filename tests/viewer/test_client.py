@@ -44,7 +44,6 @@ def test_the_first_picture_needs_few_bytes(page: Page, site: Start) -> None:
 # how much of the picture is covered, and how bright that is, mean and deviation
 PICTURE = """() => {
   const { view } = document.querySelector('eso-viewer');
-  view.aim();
   view.renderer.render(view.scene, view.camera);
   const gl = view.renderer.getContext();
   const [w, h] = [gl.drawingBufferWidth, gl.drawingBufferHeight];
@@ -163,10 +162,10 @@ def test_wire_settings_and_keys(page: Page, site: Start) -> None:
     until(page, "s.identical && s.shown === s.faces")
     page.locator("eso-viewer >> css=.wire").click()
     page.wait_for_function("document.querySelector('eso-viewer').view.meshes[0].wire?.drawRange.count === 30000")
-    before = page.evaluate("document.querySelector('eso-viewer').view.orbit.azimuth")
+    before = page.evaluate("document.querySelector('eso-viewer').view.orbit.seat.theta")
     page.locator("eso-viewer >> css=canvas").focus()
     page.keyboard.press("ArrowRight")
-    assert page.evaluate("document.querySelector('eso-viewer').view.orbit.azimuth") != before
+    assert page.evaluate("document.querySelector('eso-viewer').view.orbit.seat.theta") != before
     page.locator("eso-viewer >> css=.more").click()
     for name, value in {"colours": "uv", "shading": "flat", "up": "y"}.items():
         page.locator(f"eso-viewer >> css=[name={name}]").select_option(value)
@@ -179,17 +178,17 @@ def test_touch(browser: Any, site: Start) -> None:  # noqa: ANN401
     page.goto(site().url)
     until(page, "s.shown > 0")
     orbit = "document.querySelector('eso-viewer').view.orbit"
-    azimuth, distance = page.evaluate(f"[{orbit}.azimuth, {orbit}.distance]")
+    azimuth, distance = page.evaluate(f"[{orbit}.seat.theta, {orbit}.seat.radius]")
     touch = context.new_cdp_session(page)
     for kind, points in (("touchStart", [(100, 200)]), ("touchMove", [(160, 210)]), ("touchEnd", [])):
         touch.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": [{"x": x, "y": y} for x, y in points]})
-    turned = page.evaluate(f"{orbit}.azimuth")
+    turned = page.evaluate(f"{orbit}.seat.theta")
     assert turned != azimuth
     near, wide = [(150, 200), (200, 250)], [(100, 150), (250, 300)]
     for kind, points in (("touchStart", near), ("touchMove", wide), ("touchEnd", [])):
         touch.send("Input.dispatchTouchEvent",
                    {"type": kind, "touchPoints": [{"x": x, "y": y, "id": i} for i, (x, y) in enumerate(points)]})
-    assert page.evaluate(f"{orbit}.distance") < 0.7 * distance
+    assert page.evaluate(f"{orbit}.seat.radius") < 0.7 * distance
     assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
     context.close()
 
@@ -245,7 +244,7 @@ def test_objects_out_of_sight_wait(page: Page, site: Start, tmp_path: Path) -> N
     page.goto(f"{site(scene_file(tmp_path / 'scene.esopm')).url}?paused")
     until(page, "s.shown > 0")
     page.evaluate("""(() => { const viewer = document.querySelector('eso-viewer'); const { orbit } = viewer.view;
-      orbit.target = [4, 0, 0]; orbit.distance = 30; orbit.azimuth = orbit.height = 0; orbit.moved(); })()""")
+      orbit.target.set(4, 0, 0); orbit.seat.set(30, Math.PI / 2, 0); orbit.aim(); })()""")
     page.wait_for_timeout(400)
     page.evaluate("document.querySelector('eso-viewer').pause(false)")
     waiting = until(page, "s.waiting")
