@@ -10,6 +10,7 @@ import pytest
 
 from eso_addon.progressive.progressive import load_progressive, progressive
 from eso_addon.progressive.scene import Scene
+from eso_addon.viewer.client_files import CLIENT, FILES
 from eso_addon.viewer.page import write_page
 
 from ..progressive.meshes import grid
@@ -162,14 +163,46 @@ def test_wire_settings_and_keys(page: Page, site: Start) -> None:
     until(page, "s.identical && s.shown === s.faces")
     page.locator("eso-viewer >> css=.wire").click()
     page.wait_for_function("document.querySelector('eso-viewer').view.meshes[0].wire?.drawRange.count === 30000")
-    before = page.evaluate("document.querySelector('eso-viewer').view.orbit.seat.theta")
-    page.locator("eso-viewer >> css=canvas").focus()
-    page.keyboard.press("ArrowRight")
-    assert page.evaluate("document.querySelector('eso-viewer').view.orbit.seat.theta") != before
     page.locator("eso-viewer >> css=.more").click()
     for name, value in {"colours": "uv", "shading": "flat", "up": "y"}.items():
         page.locator(f"eso-viewer >> css=[name={name}]").select_option(value)
     page.wait_for_timeout(200)
+
+
+SEAT = "(({ theta, phi, radius }) => [theta, phi, radius])(document.querySelector('eso-viewer').view.orbit.seat)"
+
+
+def test_keys_and_mouse_move_the_camera(page: Page, site: Start) -> None:
+    page.goto(f"{site().url}?paused")
+    until(page, "s.pixels > 0")
+    home = page.evaluate(SEAT)
+    page.locator("eso-viewer >> css=canvas").focus()
+    for key, changed in {"ArrowRight": 0, "ArrowLeft": 0, "ArrowUp": 1, "ArrowDown": 1, "+": 2, "-": 2}.items():
+        before = page.evaluate(SEAT)
+        page.keyboard.press(key)
+        after = page.evaluate(SEAT)
+        assert [at for at in range(3) if after[at] != before[at]] == [changed]
+    for _ in range(99):
+        page.keyboard.press("ArrowDown")
+    assert page.evaluate(SEAT)[1] > 0  # not over the top
+    page.keyboard.press("Home")
+    assert page.evaluate(SEAT) == home
+    target = "document.querySelector('eso-viewer').view.orbit.target.toArray()"
+    center = page.evaluate(target)
+    for button in ("left", "right"):
+        page.mouse.move(300, 200)
+        page.mouse.down(button=button)
+        page.mouse.move(340, 220)
+        page.mouse.up(button=button)
+        assert (page.evaluate(target) != center) == (button == "right")
+    page.mouse.move(390, 250)  # no button is down
+    turned = page.evaluate(SEAT)
+    assert turned != home
+    page.mouse.wheel(0, 100)
+    page.wait_for_function(f"{SEAT}[2] > {turned[2]}")
+    page.mouse.dblclick(300, 200)
+    assert page.evaluate(SEAT) == home
+    assert page.evaluate(target) == center
 
 
 def test_touch(browser: Any, site: Start) -> None:  # noqa: ANN401
@@ -242,10 +275,10 @@ def test_objects_and_materials(page: Page, site: Start, tmp_path: Path) -> None:
 
 def test_objects_out_of_sight_wait(page: Page, site: Start, tmp_path: Path) -> None:
     page.goto(f"{site(scene_file(tmp_path / 'scene.esopm')).url}?paused")
-    until(page, "s.shown > 0")
+    far = until(page, "s.pixels > 0")["pixels"]  # the worker knows what the camera sees
     page.evaluate("""(() => { const viewer = document.querySelector('eso-viewer'); const { orbit } = viewer.view;
       orbit.target.set(4, 0, 0); orbit.seat.set(30, Math.PI / 2, 0); orbit.aim(); })()""")
-    page.wait_for_timeout(400)
+    until(page, f"s.pixels > {2 * far}")
     page.evaluate("document.querySelector('eso-viewer').pause(false)")
     waiting = until(page, "s.waiting")
     assert waiting["received"] < waiting["bytes"]
@@ -261,6 +294,36 @@ def test_a_page_that_holds_the_mesh(page: Page, torus: Path, tmp_path: Path) -> 
     until(page, "s.identical && s.shown === s.faces")
     assert {url.split(":")[0] for url in asked} <= {"file", "blob", "data"}
     assert sum(url.startswith("file") for url in asked) == 1
+
+
+def test_a_held_page_asks_for_no_more_than_it_needs(page: Page, torus: Path, tmp_path: Path) -> None:
+    write_page(torus, tmp_path / "torus.html")
+    page.goto(f"{(tmp_path / 'torus.html').as_uri()}?level=0.5")
+    figures = until(page, "s.shown > 0 && s.waiting")
+    assert figures["received"] < 0.7 * figures["bytes"]
+
+
+def test_one_tag_from_another_server(page: Page, torus: Path) -> None:
+    def client(route: Any) -> None:  # noqa: ANN401
+        name = route.request.url.rpartition("/")[2]
+        route.fulfill(body=(CLIENT / name).read_bytes(), content_type=FILES[name],
+                      headers={"Access-Control-Allow-Origin": "*"})
+
+    tag = '<script type="module" src="https://client.test/viewer.js" data-src="torus.esopm"></script>'
+    page.route("https://client.test/*", client)
+    page.route("https://site.test/", lambda route: route.fulfill(body=tag, content_type="text/html"))
+    page.route("https://site.test/torus.esopm", lambda route: route.fulfill(body=torus.read_bytes()))
+    page.goto("https://site.test/")
+    until(page, "s.identical && s.shown === s.faces")
+    look = page.locator("eso-viewer >> css=form").evaluate("(node) => getComputedStyle(node).position")
+    assert look == "absolute"  # its style is there too
+
+
+def test_dump_gives_what_is_there(page: Page, site: Start, torus: Path) -> None:
+    page.goto(site().url)
+    until(page, "s.identical")
+    dump = "document.querySelector('eso-viewer').dump().then(([mesh]) => [...mesh.faces])"
+    assert page.evaluate(dump) == load_progressive(torus).restore().faces.ravel().tolist()
 
 
 def test_one_tag_on_a_page(page: Page, site: Start) -> None:

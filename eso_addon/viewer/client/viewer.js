@@ -110,9 +110,9 @@ function begin(element) {
       const { meta, meshes, bytes, faces, tooMuch } = head;
       Object.assign(state, { bytes, faces });
       const names = (meta.objects ?? meshes.map((mesh) => mesh.meta)).map((one) => one.name);
-      const own = meta.name ?? (names.length === 1 && names[0]);
-      if (own && !name) panel.title(own);
-      if (own && !name && element.hasAttribute('from-url')) document.title = `${own} – ESO LOD`;
+      const own = !name && (meta.name ?? (names.length === 1 && names[0]));
+      if (own) panel.title(own);
+      if (own && element.hasAttribute('from-url')) document.title = `${own} – ESO LOD`;
       view.open(head);
       if (tooMuch) panel.message('The memory of this device holds a coarser level only: that is shown.');
       say('head');
