@@ -158,11 +158,15 @@ def test_frame_time_lowers_the_level(page: Page, site: Start) -> None:
     until(page, "s.shown === s.faces")
 
 
-def test_wire_settings_and_keys(page: Page, site: Start) -> None:
+def test_wire_and_settings(page: Page, site: Start) -> None:
     page.goto(site().url)
     until(page, "s.identical && s.shown === s.faces")
     page.locator("eso-viewer >> css=.wire").click()
     page.wait_for_function("document.querySelector('eso-viewer').view.meshes[0].wire?.drawRange.count === 30000")
+    page.locator("eso-viewer >> css=[name=wire]").press("Enter")  # sends no form
+    page.locator("eso-viewer >> css=[name=wire]").press("Space")
+    assert page.evaluate("document.querySelector('eso-viewer').view.root.children[0].children[0].visible") is False
+    assert "?" not in page.url
     page.locator("eso-viewer >> css=.more").click()
     for name, value in {"colours": "uv", "shading": "flat", "up": "y"}.items():
         page.locator(f"eso-viewer >> css=[name={name}]").select_option(value)

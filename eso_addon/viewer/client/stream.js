@@ -150,9 +150,12 @@ export function makeStream(line, wish, show, tell) {
     }
   }
 
+  /** How many bytes the header needs, as far as that is known. */
+  const needed = () => (received < FIXED ? FIXED : readFixed(file).end);
+
   /** Begin and end of what is to be fetched next; nothing where nothing is wanted. */
   function span() {
-    if (!head) return [received, Math.max(FIRST, received >= FIXED ? readFixed(file).end : 0)];
+    if (!head) return [received, Math.max(FIRST, needed())];
     const first = rows.findIndex(wanted);
     if (first < 0) return null;
     let last = first;
@@ -192,11 +195,10 @@ export function makeStream(line, wish, show, tell) {
 
   /** Read header and table once they are there. */
   async function open() {
-    if (received < FIXED || received < readFixed(file).end) return;
+    if (received < needed()) return;
     const { header, ...found } = await readHead(file, readFixed(file));
     rows = found.rows;
     const previous = [];
-    const rooms = [];
     let total = found.meshes.reduce((sum, mesh) => sum + mesh.extra, 0);
     let bytes = 0;
     for (const row of rows) {
@@ -206,10 +208,9 @@ export function makeStream(line, wish, show, tell) {
       // positions, normals and what predicts them: about 60 bytes a place, 40 a face
       bytes += 60 * (row.places - places) + 40 * (row.faces - faces);
       Object.assign(row, { before, total, have: 0, bad: 0, tooMuch: before && bytes > 1e6 * wish.memory });
-      if (!row.tooMuch) rooms[row.mesh] = row;
       previous[row.mesh] = row;
     }
-    meshes = found.meshes.map((mesh, at) => new Mesh(mesh, rooms[at]));
+    meshes = found.meshes.map((mesh, at) => new Mesh(mesh, rows.findLast((row) => row.mesh === at && !row.tooMuch)));
     head = { faces: total, base: rows[meshes.length - 1].total };
     tell({
       type: 'head', ...head, meta: header.meta ?? {}, bytes: found.end, tooMuch: rows.some((row) => row.tooMuch),
@@ -285,7 +286,7 @@ export function makeStream(line, wish, show, tell) {
       timer = setTimeout(present, rest);
       return;
     }
-    let target = Math.min(levelFaces(), wish.cap);
+    let target = Math.min(levelFaces(), wish.cap || Infinity);
     const left = there() - shown;
     if (slow && shown && left > 0) {
       const due = (1000 * (open[0].length - open[0].have)) / rate;

@@ -7,7 +7,6 @@ const USUAL = {
   paused: false,
 };
 const CAP = 2e5; // triangles at first where the time of a picture matters
-const LARGEST = 1e9;
 
 /** Settings from the tag, then from the page's address where the tag says so. */
 function readSettings(element) {
@@ -54,7 +53,7 @@ function begin(element) {
   const name = element.getAttribute('name');
   const source = element.getAttribute('src') ?? '';
   const state = { received: 0, bytes: 0, shown: 0, there: 0, faces: 0, rate: 0, splits: 0, pixels: -1, message: '', identical: false };
-  let cap = settings.frame ? CAP : LARGEST;
+  let cap = settings.frame && CAP; // triangles at most; 0: as many as there are
   let view;
   let news; // the name of an event once the level is drawn
   let frames = [];
@@ -170,7 +169,7 @@ function begin(element) {
     settings[key] = typeof USUAL[key] === 'number' ? Math.max(Number.parseFloat(value) || 0, 0) : value;
     panel.setting(key, settings[key]);
     if (key === 'frame') {
-      cap = settings.frame ? CAP : LARGEST;
+      cap = settings.frame && CAP;
       frames = [];
     }
     want({ [key]: settings[key], cap });
