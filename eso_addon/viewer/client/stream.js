@@ -2,7 +2,7 @@
 // A file on its way in: asks for as much as is wanted, decodes it, and tells which level of each mesh to show.
 import { FIXED, StreamError, check, crc32, readFixed, readHead } from './container.js';
 import { digest } from './finest.js';
-import { Mesh } from './mesh.js';
+import { base, batch, makeMesh } from './mesh.js';
 
 const FIRST = 8192; // bytes asked for at first: the first picture comes from them
 const PATIENCE = 400; // milliseconds that the first picture waits for more than the base
@@ -210,7 +210,7 @@ export function makeStream(line, wish, show, tell) {
       Object.assign(row, { before, total, have: 0, bad: 0, tooMuch: before && bytes > 1e6 * wish.memory });
       previous[row.mesh] = row;
     }
-    meshes = found.meshes.map((mesh, at) => new Mesh(mesh, rows.findLast((row) => row.mesh === at && !row.tooMuch)));
+    meshes = found.meshes.map((mesh, at) => makeMesh(mesh, rows.findLast((row) => row.mesh === at && !row.tooMuch)));
     head = { faces: total, base: rows[meshes.length - 1].total };
     tell({
       type: 'head', ...head, meta: header.meta ?? {}, bytes: found.end, tooMuch: rows.some((row) => row.tooMuch),
@@ -251,7 +251,7 @@ export function makeStream(line, wish, show, tell) {
       }
       const time = now();
       try {
-        await meshes[row.mesh][row.before ? 'batch' : 'base'](data, row.places, row.faces);
+        await (row.before ? batch : base)(meshes[row.mesh], data, row.places, row.faces);
       } catch (error) {
         for (const other of rows) if (other.mesh === row.mesh && !other.done) other.tooMuch = true;
         throw error;
