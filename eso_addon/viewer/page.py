@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import base64
 import html
+import json
 import os
 import re
 import zlib
@@ -16,6 +17,7 @@ from .client_files import CLIENT
 _THREE = ("three.core.js", "three.module.js")
 _IMPORT = re.compile(r"^import (?:\{([^}]*)\} from )?'\./([\w.]+)';\n", flags=re.MULTILINE)
 _LATER = re.compile(r"import\('\./([\w.]+)'\)")
+_TEXT = re.compile(r"await \(await fetch\(new URL\('\./([\w.]+)', import\.meta\.url\)\)\)\.text\(\)")
 _EXPORT = re.compile(r"^export (?=(?:async )?(?:function|class|const) (\w+))", flags=re.MULTILINE)
 _MAGIC = b"\x89ESOPM\r\n"
 
@@ -31,7 +33,7 @@ html, body {{ height: 100%; margin: 0; background: Canvas; }}
 eso-viewer {{ height: 100vh; height: 100dvh; border-radius: 0; }}
 </style>
 <body>
-<eso-viewer from-url held="mesh" name="{title}"></eso-viewer>
+<eso-viewer from-url name="{title}"></eso-viewer>
 <noscript>This page shows a mesh with JavaScript: switch it on.</noscript>
 <script type="application/octet-stream" id="mesh">{mesh}</script>
 <script type="text/plain" id="three.core.js">{core}</script>
@@ -46,10 +48,19 @@ const unpack = async (id) => {{
 }};
 const core = url(await unpack('three.core.js'));
 const three = await import(url((await unpack('three.module.js')).replaceAll('./three.core.js', core)));
-globalThis.ESO_WORKER = url(text('worker'));
+globalThis.ESO_WORKER = url(`const MESH = '${{text('mesh')}}';\n${{text('worker')}}`);
 {client}</script>
 <!--
 {licence}-->
+"""
+
+# before the worker's modules: what they ask a server for, in ranges, is in the page
+_HELD = """const mesh = Uint8Array.from(atob(MESH), (letter) => letter.charCodeAt(0));
+globalThis.fetch = async (_, { headers }) => {
+  const [begin, last] = headers.Range.match(/\\d+/g).map(Number);
+  const span = { 'Content-Range': `bytes ${begin}-${last}/${mesh.length}` };
+  return new Response(mesh.subarray(begin, last + 1), { status: 206, headers: span });
+};
 """
 
 
@@ -86,7 +97,7 @@ def write_page(esopm_path: str | os.PathLike[str], html_path: str | os.PathLike[
     page = _PAGE.format(
         title=html.escape(title if title is not None else source.stem),
         mesh=base64.b64encode(data).decode(), core=core, module=module,
-        worker=bundle("worker.js"), client=bundle("viewer.js"),
+        worker=_HELD + bundle("worker.js"), client=bundle("viewer.js"),
         licence=(CLIENT / "three.LICENSE").read_text(encoding="utf-8"),
     )
     with atomic_output(html_path) as draft:
@@ -115,5 +126,6 @@ def _collect(name: str, parts: dict[str, str]) -> None:
         _collect(needed, parts)
     names = ", ".join(_EXPORT.findall(text))
     body = _IMPORT.sub(lambda found: f"const {{{found[1]}}} = modules['{found[2]}'];\n" if found[1] else "", text)
+    body = _TEXT.sub(lambda found: json.dumps((CLIENT / found[1]).read_text(encoding="utf-8")), body)
     body = _EXPORT.sub("", _LATER.sub(r"modules['\1']", body))
     parts[name] = f"modules['{name}'] = (() => {{\n{body}return {{ {names} }};\n}})();\n"

@@ -10,6 +10,7 @@ import pytest
 
 from eso_addon.progressive.progressive import load_progressive, progressive
 from eso_addon.progressive.scene import Scene
+from eso_addon.viewer.client_files import CLIENT, FILES
 from eso_addon.viewer.page import write_page
 
 from ..progressive.meshes import grid
@@ -44,7 +45,6 @@ def test_the_first_picture_needs_few_bytes(page: Page, site: Start) -> None:
 # how much of the picture is covered, and how bright that is, mean and deviation
 PICTURE = """() => {
   const { view } = document.querySelector('eso-viewer');
-  view.aim();
   view.renderer.render(view.scene, view.camera);
   const gl = view.renderer.getContext();
   const [w, h] = [gl.drawingBufferWidth, gl.drawingBufferHeight];
@@ -76,7 +76,7 @@ def test_levels_back_and_forth(page: Page, site: Start, torus: Path) -> None:
     until(page, "s.identical && s.shown === s.faces")
     page.locator("eso-viewer >> css=.base").click()
     assert until(page, "s.shown < s.faces")["shown"] == base
-    page.locator("eso-viewer >> css=.level").fill("500")
+    page.locator("eso-viewer >> css=.level").fill("0.5")
     shown = until(page, f"s.shown > {base} && s.shown < s.faces")["shown"]
     assert shown == pytest.approx((base * 5000) ** 0.5, rel=0.02)
     assert "level of" in words(page, ".state")
@@ -158,19 +158,55 @@ def test_frame_time_lowers_the_level(page: Page, site: Start) -> None:
     until(page, "s.shown === s.faces")
 
 
-def test_wire_settings_and_keys(page: Page, site: Start) -> None:
+def test_wire_and_settings(page: Page, site: Start) -> None:
     page.goto(site().url)
     until(page, "s.identical && s.shown === s.faces")
     page.locator("eso-viewer >> css=.wire").click()
     page.wait_for_function("document.querySelector('eso-viewer').view.meshes[0].wire?.drawRange.count === 30000")
-    before = page.evaluate("document.querySelector('eso-viewer').view.orbit.azimuth")
-    page.locator("eso-viewer >> css=canvas").focus()
-    page.keyboard.press("ArrowRight")
-    assert page.evaluate("document.querySelector('eso-viewer').view.orbit.azimuth") != before
+    page.locator("eso-viewer >> css=[name=wire]").press("Enter")  # sends no form
+    page.locator("eso-viewer >> css=[name=wire]").press("Space")
+    assert page.evaluate("document.querySelector('eso-viewer').view.root.children[0].children[0].visible") is False
+    assert "?" not in page.url
     page.locator("eso-viewer >> css=.more").click()
     for name, value in {"colours": "uv", "shading": "flat", "up": "y"}.items():
         page.locator(f"eso-viewer >> css=[name={name}]").select_option(value)
     page.wait_for_timeout(200)
+
+
+SEAT = "(({ theta, phi, radius }) => [theta, phi, radius])(document.querySelector('eso-viewer').view.orbit.seat)"
+
+
+def test_keys_and_mouse_move_the_camera(page: Page, site: Start) -> None:
+    page.goto(f"{site().url}?paused")
+    until(page, "s.pixels > 0")
+    home = page.evaluate(SEAT)
+    page.locator("eso-viewer >> css=canvas").focus()
+    for key, changed in {"ArrowRight": 0, "ArrowLeft": 0, "ArrowUp": 1, "ArrowDown": 1, "+": 2, "-": 2}.items():
+        before = page.evaluate(SEAT)
+        page.keyboard.press(key)
+        after = page.evaluate(SEAT)
+        assert [at for at in range(3) if after[at] != before[at]] == [changed]
+    for _ in range(99):
+        page.keyboard.press("ArrowDown")
+    assert page.evaluate(SEAT)[1] > 0  # not over the top
+    page.keyboard.press("Home")
+    assert page.evaluate(SEAT) == home
+    target = "document.querySelector('eso-viewer').view.orbit.target.toArray()"
+    center = page.evaluate(target)
+    for button in ("left", "right"):
+        page.mouse.move(300, 200)
+        page.mouse.down(button=button)
+        page.mouse.move(340, 220)
+        page.mouse.up(button=button)
+        assert (page.evaluate(target) != center) == (button == "right")
+    page.mouse.move(390, 250)  # no button is down
+    turned = page.evaluate(SEAT)
+    assert turned != home
+    page.mouse.wheel(0, 100)
+    page.wait_for_function(f"{SEAT}[2] > {turned[2]}")
+    page.mouse.dblclick(300, 200)
+    assert page.evaluate(SEAT) == home
+    assert page.evaluate(target) == center
 
 
 def test_touch(browser: Any, site: Start) -> None:  # noqa: ANN401
@@ -179,17 +215,17 @@ def test_touch(browser: Any, site: Start) -> None:  # noqa: ANN401
     page.goto(site().url)
     until(page, "s.shown > 0")
     orbit = "document.querySelector('eso-viewer').view.orbit"
-    azimuth, distance = page.evaluate(f"[{orbit}.azimuth, {orbit}.distance]")
+    azimuth, distance = page.evaluate(f"[{orbit}.seat.theta, {orbit}.seat.radius]")
     touch = context.new_cdp_session(page)
     for kind, points in (("touchStart", [(100, 200)]), ("touchMove", [(160, 210)]), ("touchEnd", [])):
         touch.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": [{"x": x, "y": y} for x, y in points]})
-    turned = page.evaluate(f"{orbit}.azimuth")
+    turned = page.evaluate(f"{orbit}.seat.theta")
     assert turned != azimuth
     near, wide = [(150, 200), (200, 250)], [(100, 150), (250, 300)]
     for kind, points in (("touchStart", near), ("touchMove", wide), ("touchEnd", [])):
         touch.send("Input.dispatchTouchEvent",
                    {"type": kind, "touchPoints": [{"x": x, "y": y, "id": i} for i, (x, y) in enumerate(points)]})
-    assert page.evaluate(f"{orbit}.distance") < 0.7 * distance
+    assert page.evaluate(f"{orbit}.seat.radius") < 0.7 * distance
     assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
     context.close()
 
@@ -243,10 +279,10 @@ def test_objects_and_materials(page: Page, site: Start, tmp_path: Path) -> None:
 
 def test_objects_out_of_sight_wait(page: Page, site: Start, tmp_path: Path) -> None:
     page.goto(f"{site(scene_file(tmp_path / 'scene.esopm')).url}?paused")
-    until(page, "s.shown > 0")
+    far = until(page, "s.pixels > 0")["pixels"]  # the worker knows what the camera sees
     page.evaluate("""(() => { const viewer = document.querySelector('eso-viewer'); const { orbit } = viewer.view;
-      orbit.target = [4, 0, 0]; orbit.distance = 30; orbit.azimuth = orbit.height = 0; orbit.moved(); })()""")
-    page.wait_for_timeout(400)
+      orbit.target.set(4, 0, 0); orbit.seat.set(30, Math.PI / 2, 0); orbit.aim(); })()""")
+    until(page, f"s.pixels > {2 * far}")
     page.evaluate("document.querySelector('eso-viewer').pause(false)")
     waiting = until(page, "s.waiting")
     assert waiting["received"] < waiting["bytes"]
@@ -262,6 +298,36 @@ def test_a_page_that_holds_the_mesh(page: Page, torus: Path, tmp_path: Path) -> 
     until(page, "s.identical && s.shown === s.faces")
     assert {url.split(":")[0] for url in asked} <= {"file", "blob", "data"}
     assert sum(url.startswith("file") for url in asked) == 1
+
+
+def test_a_held_page_asks_for_no_more_than_it_needs(page: Page, torus: Path, tmp_path: Path) -> None:
+    write_page(torus, tmp_path / "torus.html")
+    page.goto(f"{(tmp_path / 'torus.html').as_uri()}?level=0.5")
+    figures = until(page, "s.shown > 0 && s.waiting")
+    assert figures["received"] < 0.7 * figures["bytes"]
+
+
+def test_one_tag_from_another_server(page: Page, torus: Path) -> None:
+    def client(route: Any) -> None:  # noqa: ANN401
+        name = route.request.url.rpartition("/")[2]
+        route.fulfill(body=(CLIENT / name).read_bytes(), content_type=FILES[name],
+                      headers={"Access-Control-Allow-Origin": "*"})
+
+    tag = '<script type="module" src="https://client.test/viewer.js" data-src="torus.esopm"></script>'
+    page.route("https://client.test/*", client)
+    page.route("https://site.test/", lambda route: route.fulfill(body=tag, content_type="text/html"))
+    page.route("https://site.test/torus.esopm", lambda route: route.fulfill(body=torus.read_bytes()))
+    page.goto("https://site.test/")
+    until(page, "s.identical && s.shown === s.faces")
+    look = page.locator("eso-viewer >> css=form").evaluate("(node) => getComputedStyle(node).position")
+    assert look == "absolute"  # its style is there too
+
+
+def test_dump_gives_what_is_there(page: Page, site: Start, torus: Path) -> None:
+    page.goto(site().url)
+    until(page, "s.identical")
+    dump = "document.querySelector('eso-viewer').dump().then(([mesh]) => [...mesh.faces])"
+    assert page.evaluate(dump) == load_progressive(torus).restore().faces.ravel().tolist()
 
 
 def test_one_tag_on_a_page(page: Page, site: Start) -> None:

@@ -20,11 +20,11 @@ from .sites import Site
 Decode = Callable[[bytes], dict[str, Any]]
 # decodes the file block by block; gives, for each block, hashes of its mesh as it then is
 DECODE = """async () => {
-  const [container, { Mesh }, { finest, digest }] = await Promise.all(
+  const [container, { base, batch, makeMesh }, { finest, digest }] = await Promise.all(
     ['container', 'mesh', 'finest'].map((name) => import(`/${name}.js`)));
   const bytes = new Uint8Array(await (await fetch('/mesh.esopm')).arrayBuffer());
   const head = await container.readHead(bytes, container.readFixed(bytes));
-  const meshes = head.meshes.map((entry) => new Mesh(entry, entry));
+  const meshes = head.meshes.map((entry) => makeMesh(entry, entry));
   const hex = async (array) => Array.from(new Uint8Array(await crypto.subtle.digest('SHA-256', array)),
     (byte) => byte.toString(16).padStart(2, '0')).join('');
   const rows = [];
@@ -32,7 +32,7 @@ DECODE = """async () => {
     const block = bytes.subarray(row.begin, row.begin + row.length);
     if (container.crc32(block) !== row.crc) throw new Error(`block ${at}`);
     const mesh = meshes[row.mesh];
-    await mesh[at < meshes.length ? 'base' : 'batch'](block, row.places, row.faces);
+    await (at < meshes.length ? base : batch)(mesh, block, row.places, row.faces);
     const level = finest(mesh);
     const arrays = [level.vertices, level.faces, level.edges, ...level.attributes.map((each) => each.bytes)];
     rows.push({ mesh: row.mesh, end: row.begin + row.length, hashes: await Promise.all(arrays.map(hex)) });

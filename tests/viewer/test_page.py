@@ -2,11 +2,13 @@
 """A page that holds a stream: whole, one file, and asks for nothing else."""
 
 import base64
+import json
 import re
 from pathlib import Path
 
 import pytest
 
+from eso_addon.viewer.client_files import CLIENT
 from eso_addon.viewer.page import bundle, write_page
 
 
@@ -32,7 +34,15 @@ def test_bundles_have_no_imports_left(entry: str) -> None:
     text = bundle(entry)
     assert not re.search(r"^(import|export) ", text, flags=re.MULTILINE)
     assert "</script" not in text
+    assert "panel.html'" not in text
     assert text.index("modules['container.js'] =" if entry == "worker.js" else "modules['panel.js'] =") > 0
+
+
+def test_the_page_holds_its_style(torus: Path, tmp_path: Path) -> None:
+    write_page(torus, tmp_path / "torus.html")
+    text = (tmp_path / "torus.html").read_text(encoding="utf-8")
+    assert json.dumps((CLIENT / "panel.html").read_text(encoding="utf-8")) in text
+    assert "<link" not in text
 
 
 def test_what_is_no_stream_is_refused(tmp_path: Path) -> None:

@@ -64,9 +64,7 @@ function gather({ faces, faceCount, head }, label, vertex, first) {
 }
 
 /** Which faces open: bit 0 `before`, bit 1 `after`; asked only at the ends of fans. */
-function open(mesh, arcs) {
-  const { asked, there, x, y, length } = arcs;
-  const { coder, sides } = mesh.splits;
+function open({ points, splits: { coder, sides } }, { asked, there, vertex, x, y, length, mean, spread }) {
   const found = read(coder, sides, Uint8Array.from(asked.filter((_, at) => at & 1)));
   found.forEach((side, at) => {
     const i = asked[2 * at];
@@ -74,23 +72,20 @@ function open(mesh, arcs) {
     there[i] = side;
     if (length[i]) return;
     // beside a lone corner both new edges end at the same ring vertex
-    if (side & 1) x[i] = y[i];
-    else y[i] = x[i];
-    expectBare(mesh.points, arcs, i);
+    if ((side & 1) === 0) {
+      y[i] = x[i];
+      return;
+    }
+    x[i] = y[i];
+    let sum = 0;
+    for (let a = 0; a < 3; a++) {
+      const own = points[4 * vertex[i] + a];
+      const end = points[4 * x[i] + a];
+      const m = (mean[3 * i + a] = Math.floor((own + end + 1) / 2));
+      sum += Math.abs(own - m) + Math.abs(end - m);
+    }
+    spread[i] = Math.floor(sum / 2);
   });
-}
-
-/** What a split without an arc expects: its ring is its own place and one more. */
-function expectBare(points, { vertex, x, mean, normal, axis, spread }, i) {
-  let sum = 0;
-  for (let a = 0; a < 3; a++) {
-    const own = points[4 * vertex[i] + a];
-    const end = points[4 * x[i] + a];
-    const m = (mean[3 * i + a] = Math.floor((own + end + 1) / 2));
-    sum += Math.abs(own - m) + Math.abs(end - m);
-    normal[3 * i + a] = axis[i] = 0;
-  }
-  spread[i] = Math.floor(sum / 2);
 }
 
 /** Move the corners of all arcs to the new places. */

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Where the bytes come from: byte ranges of a file on a server, or bytes that the page holds.
+// Where the bytes come from: byte ranges of a file on a server.
 import { StreamError } from './container.js';
 
 const broken = () => new StreamError('The connection broke off.', true);
@@ -52,15 +52,4 @@ export function makeLine(url) {
   }
 
   return line;
-}
-
-/** The same of bytes that the page itself holds. */
-export function makeHeld(bytes) {
-  return {
-    ranges: true,
-    size: bytes.length,
-    async* read(begin, end) {
-      for (; begin < Math.min(end, bytes.length); begin += 65536) yield bytes.subarray(begin, Math.min(begin + 65536, end));
-    },
-  };
 }

@@ -5,75 +5,75 @@ import { makeColumns } from './columns.js';
 import { check, inflate } from './container.js';
 import { makeGrid, put } from './positions.js';
 
-export class Mesh {
-  /** `head`: the mesh's entry of the header. `room`: { places, faces } that its arrays shall hold. */
-  constructor(head, room) {
-    const n = room.places;
-    const m = room.faces + head.extra;
-    const wedged = head.needs.includes('wedges');
-    const w = wedged ? head.wedges : n;
-    const same = new Int32Array(n + 1).map((_, at) => at);
-    const ints = (count) => new Int32Array(count);
-    this.head = head;
-    this.wedged = wedged;
-    this.points = ints(4 * n); // on the grid of predictions; the fourth number is for `link`
-    this.positions = new Float32Array(3 * n);
-    this.positionBits = new Int32Array(this.positions.buffer); // a signalling NaN must keep its bits
-    this.faces = ints(3 * m); // places; faces beside the splits come first
-    this.parents = ints(n).fill(-1);
-    this.facesAfter = ints(n); // faces once each place is there
+/** `head`: the mesh's entry of the header. `room`: { places, faces } that its arrays shall hold. */
+export function makeMesh(head, room) {
+  const n = room.places;
+  const m = room.faces + head.extra;
+  const wedged = head.needs.includes('wedges');
+  const w = wedged ? head.wedges : n;
+  const same = new Int32Array(n + 1).map((_, at) => at);
+  const ints = (count) => new Int32Array(count);
+  const positions = new Float32Array(3 * n);
+  const faces = ints(3 * m);
+  const parents = ints(n).fill(-1);
+  const rows = { vertex: head.vertices, corner: w, face: m, side: m, edge: head.edges };
+  return {
+    head, wedged, positions, faces, parents, // faces have places; those beside the splits come first
+    positionBits: new Int32Array(positions.buffer), // a signalling NaN must keep its bits
+    points: ints(4 * n), // on the grid of predictions; the fourth number is for `link`
+    facesAfter: ints(n), // faces once each place is there
     // wedges of each place, of each corner; where there are none, places are their wedges, and these their vertices
-    this.starts = wedged ? ints(n + 1) : same;
-    this.wedges = wedged ? ints(3 * m) : this.faces;
-    this.wedgePlace = wedged ? ints(w) : same;
-    this.wedgeVertex = wedged ? ints(w) : same;
-    this.wedgeParents = wedged ? ints(w).fill(-1) : this.parents;
-    this.turned = head.needs.includes('turned') ? new Uint8Array(m) : null;
-    this.edges = ints(2 * head.edges);
-    const rows = { vertex: head.vertices, corner: w, face: m, side: m, edge: head.edges };
-    this.attributes = head.attributes.map((entry) => makeAttribute(entry, rows));
-    this.places = this.faceCount = this.wedgeCount = this.vertexCount = 0;
-    this.grid = makeGrid(head.grid);
-  }
+    starts: wedged ? ints(n + 1) : same,
+    wedges: wedged ? ints(3 * m) : faces,
+    wedgePlace: wedged ? ints(w) : same,
+    wedgeVertex: wedged ? ints(w) : same,
+    wedgeParents: wedged ? ints(w).fill(-1) : parents,
+    turned: head.needs.includes('turned') ? new Uint8Array(m) : null,
+    edges: ints(2 * head.edges),
+    attributes: head.attributes.map((entry) => makeAttribute(entry, rows)),
+    places: 0, faceCount: 0, wedgeCount: 0, vertexCount: 0,
+    grid: makeGrid(head.grid),
+    splits: null,
+  };
+}
 
-  /** Read the base block. */
-  async base(bytes, places, count) {
-    const { head, faces, edges } = this;
-    const states = bytes.length - 4 * head.lanes;
-    const columns = makeColumns(await inflate(bytes.subarray(0, states)));
-    const [deltas, running] = columns;
-    for (let axis = 0; axis < 3; axis++) running(4, places).forEach((number, place) => put(this, place, axis, number));
-    const readPairs = (out, at, step, number, rows) => {
-      const first = running(4, number);
-      first.forEach((value, i) => (out[at + step * i] = value));
-      for (let row = 1; row < rows; row++) deltas(4, number).forEach((delta, i) => (out[at + step * i + row] = first[i] + delta));
-    };
-    readPairs(faces, 3 * head.extra, 3, count, 3);
-    readPairs(faces, 0, 3, head.extra, 3);
-    this.places = places;
-    this.faceCount = head.extra + count;
-    check(faces.subarray(0, 3 * this.faceCount).every((place) => place >>> 0 < places));
-    this.facesAfter.fill(this.faceCount, 0, places);
-    this.splits = makeSplits(this, bytes.subarray(states));
-    readPlaces(this, columns, 0);
-    readWedges(this, columns, null, 0);
-    readFaceValues(this, columns, 0, new Int32Array(this.faceCount));
-    readPairs(edges, 0, 2, head.edges, 2);
-    readValues(this, columns, 'edge', 0, new Int32Array(head.edges));
-  }
+/** Read the base block. */
+export async function base(mesh, bytes, places, count) {
+  const { head, faces, edges } = mesh;
+  const states = bytes.length - 4 * head.lanes;
+  const columns = makeColumns(await inflate(bytes.subarray(0, states)));
+  const [deltas, running] = columns;
+  for (let axis = 0; axis < 3; axis++) running(4, places).forEach((number, place) => put(mesh, place, axis, number));
+  const readPairs = (out, at, step, number, rows) => {
+    const first = running(4, number);
+    first.forEach((value, i) => (out[at + step * i] = value));
+    for (let row = 1; row < rows; row++) deltas(4, number).forEach((delta, i) => (out[at + step * i + row] = first[i] + delta));
+  };
+  readPairs(faces, 3 * head.extra, 3, count, 3);
+  readPairs(faces, 0, 3, head.extra, 3);
+  mesh.places = places;
+  mesh.faceCount = head.extra + count;
+  check(faces.subarray(0, 3 * mesh.faceCount).every((place) => place >>> 0 < places));
+  mesh.facesAfter.fill(mesh.faceCount, 0, places);
+  mesh.splits = makeSplits(mesh, bytes.subarray(states));
+  readPlaces(mesh, columns, 0);
+  readWedges(mesh, columns, null, 0);
+  readFaceValues(mesh, columns, 0, new Int32Array(mesh.faceCount));
+  readPairs(edges, 0, 2, head.edges, 2);
+  readValues(mesh, columns, 'edge', 0, new Int32Array(head.edges));
+}
 
-  /** Read a batch and carry it out. */
-  async batch(bytes, places, count) {
-    const [symbols, plain] = new Uint32Array(bytes.slice(0, 8).buffer);
-    const end = 8 + symbols + plain;
-    check(end <= bytes.length && plain % 4 === 0 && symbols % 2 === 0);
-    const [first, firstFace] = [this.places, this.faceCount];
-    const columns = makeColumns(await inflate(bytes.subarray(end)));
-    const arcs = split(this, bytes.subarray(8, 8 + symbols), bytes.subarray(8 + symbols, end), places, count + this.head.extra);
-    readPlaces(this, columns, first);
-    readWedges(this, columns, arcs, firstFace);
-    readFaceValues(this, columns, firstFace, arcs.besides);
-  }
+/** Read a batch and carry it out. */
+export async function batch(mesh, bytes, places, count) {
+  const [symbols, plain] = new Uint32Array(bytes.slice(0, 8).buffer);
+  const end = 8 + symbols + plain;
+  check(end <= bytes.length && plain % 4 === 0 && symbols % 2 === 0);
+  const { places: first, faceCount: firstFace } = mesh;
+  const columns = makeColumns(await inflate(bytes.subarray(end)));
+  const arcs = split(mesh, bytes.subarray(8, 8 + symbols), bytes.subarray(8 + symbols, end), places, count + mesh.head.extra);
+  readPlaces(mesh, columns, first);
+  readWedges(mesh, columns, arcs, firstFace);
+  readFaceValues(mesh, columns, firstFace, arcs.besides);
 }
 
 function makeAttribute([domain, name, dtype, shape], rows) {

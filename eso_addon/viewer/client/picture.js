@@ -109,17 +109,17 @@ export function makePicture(mesh) {
   return (places, wire) => {
     const limit = starts[places];
     const { index, groups } = triangles(limit, facesAfter[places - 1] ?? 0);
-    const out = { index, groups, places, first: sent };
-    if (!custom) out.normals = normals(index, limit);
-    if (wire) out.wire = wireOf(index);
+    const buffers = []; // three's name, numbers a wedge, the first wedge, and the numbers
+    const add = (name, width, read) => buffers.push([name, width, sent, values(limit, width, read)]);
+    if (!custom) buffers.push(['normal', 4, 0, normals(index, limit)]);
     if (limit > sent) {
-      out.positions = values(limit, 3, (wedge, axis) => mesh.positions[3 * wedgePlace[wedge] + axis]);
-      if (uvs) out.uvs = values(limit, 2, reader(uvs, real));
-      if (custom) out.custom = values(limit, 3, reader(custom, real));
-      if (colours) out.colours = values(limit, 3, reader(colours, colours.type === 'f4' ? real : linear));
+      add('position', 3, (wedge, axis) => mesh.positions[3 * wedgePlace[wedge] + axis]);
+      if (uvs) add('uv', 2, reader(uvs, real));
+      if (custom) add('normal', 3, reader(custom, real));
+      if (colours) add('color', 3, reader(colours, colours.type === 'f4' ? real : linear));
       sent = limit;
     }
-    return out;
+    return { index, groups, buffers, wire: wire && wireOf(index) };
   };
 }
 

@@ -2,7 +2,7 @@
 // A file on its way in: asks for as much as is wanted, decodes it, and tells which level of each mesh to show.
 import { FIXED, StreamError, check, crc32, readFixed, readHead } from './container.js';
 import { digest } from './finest.js';
-import { Mesh } from './mesh.js';
+import { base, batch, makeMesh } from './mesh.js';
 
 const FIRST = 8192; // bytes asked for at first: the first picture comes from them
 const PATIENCE = 400; // milliseconds that the first picture waits for more than the base
@@ -33,8 +33,7 @@ export function makeStream(line, wish, show, tell) {
   let pace = { time: begun, bytes: 0 };
   let speed = 0; // bytes a second
   let abort;
-  let troubled = false;
-  let retry;
+  let trouble = {}; // what is wrong now: { message, failed }
   let based; // when the base was there
   let levels = []; // places of each mesh in the last picture
   let shown = 0; // their triangles
@@ -51,7 +50,9 @@ export function makeStream(line, wish, show, tell) {
     // of other wishes the next part asks; without ranges the line is held, not left
     if (line.ranges && (wishes.paused || 'budget' in wishes)) abort?.abort();
     wake();
-    present('level' in wishes || 'cap' in wishes);
+    if ('wire' in wishes) levels = levels.map(() => -1); // the same anew
+    present(!wishes.views);
+    report();
   }
 
   function wake() {
@@ -79,22 +80,23 @@ export function makeStream(line, wish, show, tell) {
         const seconds = Math.min(0.5 * 2 ** attempt++, 10);
         if (error.again) text += ` What came is shown; trying again in ${Math.ceil(seconds)} s.`;
         present(true); // what came is shown, before it is said
-        tell({ type: 'trouble', text, failed: !error.again });
-        troubled = true;
-        retry = false;
+        complain(text, !error.again);
         if (error.again) await change(1000 * seconds);
-        else {
-          while (!retry) await change();
-          if (!head) received = 0;
-        }
+        while (trouble.failed) await change();
+        if (!head && !error.again) received = 0;
       }
     }
   }
 
+  function complain(message, failed = false) {
+    trouble = { message, failed };
+    report();
+  }
+
   /** Try once more after a failure or a broken line. */
   function again() {
-    retry = true;
     for (const row of rows) row.bad = 0;
+    complain('');
     wake();
   }
 
@@ -121,16 +123,10 @@ export function makeStream(line, wish, show, tell) {
   /** Take in a part of the file. */
   function keep(part, at) {
     const end = at + part.length;
-    if (end > file.length) {
-      const grown = new Uint8Array(Math.max(end, 2 * file.length));
-      grown.set(file);
-      file = grown;
-    }
+    if (end > file.length) file = new Uint8Array(file.buffer.transfer(Math.max(end, 2 * file.length)));
     file.set(part, at);
     mark(at, end);
     received += part.length;
-    if (troubled) tell({ type: 'trouble', text: '' });
-    troubled = false;
     const time = now();
     if (wish.budget) {
       paid += (1000 * part.length) / wish.budget;
@@ -142,7 +138,8 @@ export function makeStream(line, wish, show, tell) {
       speed = speed ? (speed + last) / 2 : last;
       pace = { time, bytes: 0 };
     }
-    if (wish.budget || time > told + 60) report();
+    if (trouble.message) complain('');
+    else if (wish.budget || time > told + 60) report();
   }
 
   /** Note that the blocks have these bytes of the file. */
@@ -153,9 +150,12 @@ export function makeStream(line, wish, show, tell) {
     }
   }
 
+  /** How many bytes the header needs, as far as that is known. */
+  const needed = () => (received < FIXED ? FIXED : readFixed(file).end);
+
   /** Begin and end of what is to be fetched next; nothing where nothing is wanted. */
   function span() {
-    if (!head) return [received, Math.max(FIRST, received >= FIXED ? readFixed(file).end : 0)];
+    if (!head) return [received, Math.max(FIRST, needed())];
     const first = rows.findIndex(wanted);
     if (first < 0) return null;
     let last = first;
@@ -195,11 +195,10 @@ export function makeStream(line, wish, show, tell) {
 
   /** Read header and table once they are there. */
   async function open() {
-    if (received < FIXED || received < readFixed(file).end) return;
+    if (received < needed()) return;
     const { header, ...found } = await readHead(file, readFixed(file));
     rows = found.rows;
     const previous = [];
-    const rooms = [];
     let total = found.meshes.reduce((sum, mesh) => sum + mesh.extra, 0);
     let bytes = 0;
     for (const row of rows) {
@@ -208,11 +207,10 @@ export function makeStream(line, wish, show, tell) {
       total += row.faces - faces;
       // positions, normals and what predicts them: about 60 bytes a place, 40 a face
       bytes += 60 * (row.places - places) + 40 * (row.faces - faces);
-      Object.assign(row, { before, total, have: 0, bad: 0, tooMuch: before && bytes > wish.memory });
-      if (!row.tooMuch) rooms[row.mesh] = row;
+      Object.assign(row, { before, total, have: 0, bad: 0, tooMuch: before && bytes > 1e6 * wish.memory });
       previous[row.mesh] = row;
     }
-    meshes = found.meshes.map((mesh, at) => new Mesh(mesh, rooms[at]));
+    meshes = found.meshes.map((mesh, at) => makeMesh(mesh, rows.findLast((row) => row.mesh === at && !row.tooMuch)));
     head = { faces: total, base: rows[meshes.length - 1].total };
     tell({
       type: 'head', ...head, meta: header.meta ?? {}, bytes: found.end, tooMuch: rows.some((row) => row.tooMuch),
@@ -227,11 +225,14 @@ export function makeStream(line, wish, show, tell) {
   /** Triangles of all meshes in the level that is asked for. */
   const levelFaces = () => (wish.level < 1 ? Math.round(head.base * (head.faces / head.base) ** wish.level) : Infinity);
 
+  /** What the camera sees of a mesh. */
+  const sight = (mesh) => wish.views?.[mesh] ?? { visible: true, scale: 0 };
+
   /** Whether a block shall be fetched. */
   function wanted(row) {
     if (row.done || row.tooMuch) return false;
     if (!row.before) return true;
-    const { visible, scale } = wish.views?.[row.mesh] ?? { visible: true, scale: 0 };
+    const { visible, scale } = sight(row.mesh);
     if (wish.paused || !visible || row.before.total >= levelFaces()) return false;
     const pixels = row.before.error * scale; // 0 where unknown
     return !wish.error || (scale > 0 && !(pixels > 0 && pixels <= wish.error));
@@ -250,7 +251,7 @@ export function makeStream(line, wish, show, tell) {
       }
       const time = now();
       try {
-        await meshes[row.mesh][row.before ? 'batch' : 'base'](data, row.places, row.faces);
+        await (row.before ? batch : base)(meshes[row.mesh], data, row.places, row.faces);
       } catch (error) {
         for (const other of rows) if (other.mesh === row.mesh && !other.done) other.tooMuch = true;
         throw error;
@@ -264,11 +265,11 @@ export function makeStream(line, wish, show, tell) {
       breathed = now();
     }
     present();
-    if (!rows.every((row) => row.done) || whole.time) return;
+    if (!rows.every((row) => row.done) || whole.seconds) return;
     let identical = true;
     for (const mesh of meshes) identical &&= (await digest(mesh)) === mesh.head.hash;
-    whole = { identical, quantised: meshes.some((mesh) => mesh.head.bits), time: now() - begun };
-    report();
+    whole = { identical, quantised: meshes.some((mesh) => mesh.head.bits), seconds: (now() - begun) / 1000 };
+    complain(identical ? '' : 'What came is not what was sent: the file is damaged. Load it anew.');
   }
 
   // -- pictures ----------------------------------------------------------------------------------------------------
@@ -285,7 +286,7 @@ export function makeStream(line, wish, show, tell) {
       timer = setTimeout(present, rest);
       return;
     }
-    let target = Math.min(levelFaces(), wish.cap);
+    let target = Math.min(levelFaces(), wish.cap || Infinity);
     const left = there() - shown;
     if (slow && shown && left > 0) {
       const due = (1000 * (open[0].length - open[0].have)) / rate;
@@ -336,16 +337,21 @@ export function makeStream(line, wish, show, tell) {
     return places;
   }
 
+  /** The error on screen of what is shown of a mesh, in pixels; infinite where unknown. */
+  function errorOf(places, mesh) {
+    const { visible, scale } = sight(mesh);
+    const own = rows.filter((row) => row.mesh === mesh);
+    const row = own.findLast((one) => one.places <= places);
+    if (!visible || row === own.at(-1)) return 0;
+    return row?.error ? row.error * scale : Infinity;
+  }
+
   /** Tell how far all is. */
   function report() {
     told = now();
-    const errors = levels.map((places, mesh) => {
-      const own = rows.filter((row) => row.mesh === mesh);
-      const row = own.findLast((one) => one.places <= places);
-      return row === own.at(-1) ? 0 : row?.error || -1;
-    });
+    const pixels = Math.max(-1, ...levels.map(errorOf));
     tell({
-      type: 'state', received, there: there(), shown, errors, splits, ...whole, ranges: line.ranges,
+      type: 'state', received, there: there(), shown, splits, message: '', ...trouble, ...whole, pixels: pixels < Infinity ? pixels : -1,
       rate: busy && (1000 * splits) / busy, waiting: rows.some((row) => !row.done) && !rows.some(wanted),
     });
   }
@@ -361,11 +367,6 @@ export function makeStream(line, wish, show, tell) {
     drawn() {
       drawing = false;
       present();
-    },
-    /** Show the same level anew. */
-    renew() {
-      levels = levels.map(() => -1);
-      present(true);
     },
   };
 }

@@ -2,15 +2,13 @@
 // The picture: buffers of the meshes' levels, objects, materials, light and camera.
 import {
   Box3, BufferAttribute, BufferGeometry, Color, DataTexture, DirectionalLight, DoubleSide, Frustum, Group, HemisphereLight,
-  LineBasicMaterial, LineSegments, Matrix4, Mesh, MeshPhongMaterial, PerspectiveCamera, RepeatWrapping, Scene, Sphere, SRGBColorSpace,
+  LineBasicMaterial, LineSegments, Matrix4, Mesh, MeshPhongMaterial, PerspectiveCamera, RepeatWrapping, Scene, SRGBColorSpace,
   Vector3, WebGLRenderer,
 } from './three.module.js';
 import { makeOrbit } from './orbit.js';
 
 const CLAY = 0xb9bfc9;
 const LAMPS = [[-1, 1.4, 1.2, 2.1], [1.6, 0.3, 0.6, 0.7], [0.2, 0.6, -1.4, 0.9]]; // from where, how strong
-// three's names of buffers, ours, and numbers a vertex
-const BUFFERS = [['position', 'positions', 3], ['normal', 'normals', 4], ['normal', 'custom', 3], ['uv', 'uvs', 2], ['color', 'colours', 3]];
 
 /**
  * Draw on a canvas as `settings` say: { wire, colours, shading, up }. `drawn` is called after each picture, `look` when the camera has
@@ -25,7 +23,6 @@ export function makeView(canvas, settings, { drawn, look: moved, say, below }) {
   const materials = new Map();
   const meshes = [];
   let given = []; // materials of the file
-  let ball; // around all that was there when the camera was put in its place
   let asked = false;
   scene.add(root, camera, new HemisphereLight(0xffffff, 0x6b6e7a, 1));
   for (const [x, y, z, strength] of LAMPS) {
@@ -33,16 +30,13 @@ export function makeView(canvas, settings, { drawn, look: moved, say, below }) {
     lamp.position.set(x, y, z);
     camera.add(lamp, lamp.target);
   }
-  const orbit = makeOrbit(canvas, camera.fov, () => {
+  const orbit = makeOrbit(canvas, camera, () => {
     redraw();
     moved();
   });
   const resizer = new ResizeObserver(resize);
   resizer.observe(canvas);
-  canvas.addEventListener('webglcontextlost', (event) => {
-    event.preventDefault();
-    say('The graphics card has given up the picture. It comes back when the browser allows.');
-  });
+  canvas.addEventListener('webglcontextlost', () => say('The graphics card has given up the picture. It comes back when the browser allows.'));
   canvas.addEventListener('webglcontextrestored', () => {
     say('');
     redraw();
@@ -51,15 +45,21 @@ export function makeView(canvas, settings, { drawn, look: moved, say, below }) {
   /** Make room for the meshes that the header names. */
   function open(head) {
     given = head.meta.materials ?? [];
-    for (const mesh of head.meshes) meshes.push({ ...mesh, geometry: new BufferGeometry(), box: new Box3(), nodes: [], groups: [] });
+    for (const mesh of head.meshes) {
+      const [geometry, wire] = [new BufferGeometry(), new BufferGeometry()];
+      wire.attributes = geometry.attributes;
+      meshes.push({ ...mesh, geometry, wire, box: new Box3(), nodes: [], groups: [] });
+    }
     const plain = meshes.map((_, mesh) => ({ mesh }));
     for (const object of head.meta.objects?.length ? head.meta.objects : plain) {
       const mesh = meshes[object.mesh];
       const node = new Mesh(mesh.geometry, []);
       node.name = object.name ?? '';
-      node.frustumCulled = node.matrixAutoUpdate = false;
+      node.matrixAutoUpdate = false;
       if (object.matrix) node.matrix.set(...object.matrix);
       node.slots = object.materials ?? mesh.meta.materials ?? [];
+      node.add(new LineSegments(mesh.wire, lines));
+      node.traverse((one) => { one.frustumCulled = false; });
       mesh.nodes.push(node);
       root.add(node);
     }
@@ -71,27 +71,20 @@ export function makeView(canvas, settings, { drawn, look: moved, say, below }) {
     changes.forEach((change, at) => {
       if (!change) return;
       const mesh = meshes[at];
-      const { geometry, wedges, corners, box } = mesh;
-      const { positions = [], first, index, wire } = change;
-      for (const [name, own, size] of BUFFERS) {
-        const array = change[own];
-        if (!array) continue;
+      const { geometry, wire, wedges, corners, box } = mesh;
+      for (const [name, size, first, array] of change.buffers) {
         if (!geometry.hasAttribute(name)) {
-          geometry.setAttribute(name, new BufferAttribute(new array.constructor(size * wedges), size, own === 'normals'));
+          const whole = array.BYTES_PER_ELEMENT < 4; // stands for parts of one
+          geometry.setAttribute(name, new BufferAttribute(new array.constructor(size * wedges), size, whole));
         }
-        put(geometry.getAttribute(name), array, own === 'normals' ? 0 : size * first);
+        put(geometry.getAttribute(name), array, size * first);
+        if (name === 'position') box.union(new Box3().setFromArray(array));
       }
-      const point = new Vector3();
-      for (let i = 0; i < positions.length; i += 3) box.expandByPoint(point.fromArray(positions, i));
-      putIndex(geometry, index, corners);
+      putIndex(geometry, change.index, corners);
+      if (change.wire) putIndex(wire, change.wire, 2 * corners);
       mesh.groups = change.groups;
       geometry.clearGroups();
       mesh.groups.forEach(([start, count], number) => geometry.addGroup(start, count, number));
-      if (wire) {
-        mesh.wire ??= new BufferGeometry();
-        mesh.wire.attributes = geometry.attributes;
-        putIndex(mesh.wire, wire, 2 * corners);
-      }
     });
     look();
   }
@@ -134,29 +127,23 @@ export function makeView(canvas, settings, { drawn, look: moved, say, below }) {
     for (const mesh of meshes) {
       for (const node of mesh.nodes) {
         node.material = mesh.groups.map(([, , slot, flat]) => material(mesh, node.slots[slot], flat));
-        if (mesh.wire && !node.children.length) {
-          node.add(new LineSegments(mesh.wire, lines));
-          node.children[0].frustumCulled = false;
-        }
-        for (const child of node.children) child.visible = settings.wire;
+        node.children[0].visible = settings.wire && Boolean(mesh.wire.index);
       }
     }
-    if (root.rotation.x !== tilt) {
-      root.rotation.x = tilt;
-      if (ball) frame();
-    }
+    const tilted = root.rotation.x !== tilt;
+    root.rotation.x = tilt;
     root.updateMatrixWorld(true);
+    if (tilted) frame();
     redraw();
   }
 
   /** Look at all that is there, as far as it is known by now. */
   function frame() {
-    root.updateMatrixWorld(true);
     const all = new Box3();
     for (const { box, nodes } of meshes) for (const node of nodes) all.union(box.clone().applyMatrix4(node.matrixWorld));
     if (all.isEmpty()) return;
-    ball = all.getBoundingSphere(new Sphere());
-    orbit.frame(ball.center.toArray(), ball.radius || 1);
+    all.getBoundingSphere(orbit.ball);
+    orbit.home();
   }
 
   const density = () => Math.min(window.devicePixelRatio, 2);
@@ -171,13 +158,11 @@ export function makeView(canvas, settings, { drawn, look: moved, say, below }) {
     const shift = Math.min(below(), 0.5 * height);
     camera.setViewOffset(width, height, 0, shift / 2, width, height);
     orbit.free = (height - shift) / height;
-    if (ball) orbit.frame(ball.center.toArray(), ball.radius || 1);
-    redraw();
+    orbit.home();
   }
 
   /** What the camera sees of each mesh: { visible, scale }, scale in pixels a unit at its nearest point. */
   function views() {
-    aim();
     const frustum = new Frustum().setFromProjectionMatrix(
       new Matrix4().multiplyMatrices(camera.projectionMatrix, camera.matrixWorldInverse));
     const pixels = (canvas.clientHeight * density() * camera.projectionMatrix.elements[5]) / 2;
@@ -195,17 +180,12 @@ export function makeView(canvas, settings, { drawn, look: moved, say, below }) {
     });
   }
 
-  function aim() {
-    orbit.aim(camera);
-  }
-
   function redraw() {
     if (asked) return;
     asked = true;
     requestAnimationFrame((time) => {
       asked = false;
       if (!canvas.clientWidth) return;
-      aim();
       renderer.render(scene, camera);
       drawn(time);
     });
@@ -216,7 +196,7 @@ export function makeView(canvas, settings, { drawn, look: moved, say, below }) {
     renderer.dispose();
   }
 
-  return { renderer, scene, camera, root, orbit, meshes, open, apply, look, frame, views, aim, redraw, close };
+  return { renderer, scene, camera, root, orbit, meshes, open, apply, look, frame, views, redraw, close };
 }
 
 /** Whether the processor draws: smooth edges then take three quarters of a picture's time. */

@@ -7,7 +7,6 @@ const USUAL = {
   paused: false,
 };
 const CAP = 2e5; // triangles at first where the time of a picture matters
-const LARGEST = 1e9;
 
 /** Settings from the tag, then from the page's address where the tag says so. */
 function readSettings(element) {
@@ -53,48 +52,39 @@ function begin(element) {
   const settings = readSettings(element);
   const name = element.getAttribute('name');
   const source = element.getAttribute('src') ?? '';
-  const state = { received: 0, bytes: 0, shown: 0, there: 0, faces: 0, rate: 0, splits: 0, errors: [], message: '', identical: false };
-  const dumps = new Map();
-  const { budget, error, level: part, paused, memory } = settings;
-  const held = document.getElementById(element.getAttribute('held'))?.textContent;
-  let cap = settings.frame ? CAP : LARGEST;
-  const worker = makeWorker({
-    url: held ? null : new URL(source, document.baseURI).href, wish: { budget, error, level: part, paused, memory: memory * 1e6, cap },
-  });
-  const post = (type, more) => worker.postMessage({ type, ...more });
-  const wish = (one) => post('wish', { wish: one });
+  const state = { received: 0, bytes: 0, shown: 0, there: 0, faces: 0, rate: 0, splits: 0, pixels: -1, message: '', identical: false };
+  let cap = settings.frame && CAP; // triangles at most; 0: as many as there are
   let view;
-  let views; // what the camera sees of each mesh
   let news; // the name of an event once the level is drawn
   let frames = [];
   let lastFrame = 0;
   let looking;
-  let telling;
 
-  const panel = makePanel(element.shadowRoot ?? element.attachShadow({ mode: 'open' }), {
-    play: () => pause(!settings.paused), again, level, set,
-    wire: () => wire(!settings.wire),
-  });
+  const worker = makeWorker({ url: new URL(source, document.baseURI).href, wish: { ...settings, cap } });
+  const post = (action, wishes, ports = []) => worker.postMessage([action, wishes], ports);
+  const want = (wishes) => post('want', wishes);
+  const panel = makePanel(element.shadowRoot ?? element.attachShadow({ mode: 'open' }), set, again);
   Object.assign(element, {
-    level, pause, wire, set, again, dump,
+    set, again, dump,
+    stats: state,
+    /** Go to a level: 0 is the base, 1 the whole; between them as the slider. */
+    level: (part) => set('level', part),
+    /** Stop loading, or go on. */
+    pause: (on = true) => set('paused', on),
+    wire: (on) => set('wire', on),
     close() {
       worker.terminate();
       view?.close();
     },
   });
-  Object.defineProperty(element, 'stats', { get: () => ({ ...state, pixels: pixels() }) });
   element.style.colorScheme = settings.theme;
   for (const one of Object.keys(settings)) panel.setting(one, settings[one]);
   panel.title(name ?? source.split('/').pop().replace(/\.esopm$/, ''));
 
-  if (held) post('held', { base64: held });
-  if (settings.wire) post('wire', { on: true });
   const ready = show();
   worker.onmessage = async ({ data }) => {
     await ready;
-    if (!view) return;
-    heard[data.type](data);
-    telling ||= setTimeout(tell, data.type === 'state' ? 80 : 0);
+    if (view) heard[data.type](data);
   };
   worker.onerror = (event) => {
     event.preventDefault();
@@ -119,9 +109,9 @@ function begin(element) {
       const { meta, meshes, bytes, faces, tooMuch } = head;
       Object.assign(state, { bytes, faces });
       const names = (meta.objects ?? meshes.map((mesh) => mesh.meta)).map((one) => one.name);
-      const own = meta.name ?? (names.length === 1 && names[0]);
-      if (own && !name) panel.title(own);
-      if (own && !name && element.hasAttribute('from-url')) document.title = `${own} – ESO LOD`;
+      const own = !name && (meta.name ?? (names.length === 1 && names[0]));
+      if (own) panel.title(own);
+      if (own && element.hasAttribute('from-url')) document.title = `${own} – ESO LOD`;
       view.open(head);
       if (tooMuch) panel.message('The memory of this device holds a coarser level only: that is shown.');
       say('head');
@@ -129,32 +119,19 @@ function begin(element) {
 
     level({ changes, first }) {
       view.apply(changes);
-      news ??= 'level';
+      news = first ? 'first' : 'level';
       if (!first) return;
-      news = 'first';
       state.firstPicture = first;
       view.frame();
-      look();
     },
 
     state(figures) {
-      const ended = figures.time && !state.seconds;
+      const { message, failed, seconds } = state;
       Object.assign(state, figures);
-      if (!ended) return;
-      state.seconds = figures.time / 1000;
-      if (!state.identical) panel.message('What came is not what was sent: the file is damaged. Load it anew.', true);
-      say('whole', figures);
-    },
-
-    trouble({ text, failed }) {
-      Object.assign(state, { message: text, failed });
-      panel.message(text, true);
-      if (failed) say('failed', { text });
-    },
-
-    dump({ id, meshes }) {
-      dumps.get(id)(meshes);
-      dumps.delete(id);
+      if (state.message !== message) panel.message(state.message, true);
+      if (state.failed && !failed) say('failed', { text: state.message });
+      if (state.seconds && !seconds) say('whole', figures);
+      tell();
     },
   };
 
@@ -181,7 +158,7 @@ function begin(element) {
     if (part < 0.87) cap = Math.max(Math.min(shown, cap) * Math.max(0.5, 0.95 * part), 500);
     else if (part > 1.18 && cap < 2 * there && shown >= 0.9 * Math.min(cap, there)) cap *= 1.25;
     if (cap === before) return;
-    wish({ cap });
+    want({ cap });
     view.redraw();
   }
 
@@ -192,33 +169,15 @@ function begin(element) {
     settings[key] = typeof USUAL[key] === 'number' ? Math.max(Number.parseFloat(value) || 0, 0) : value;
     panel.setting(key, settings[key]);
     if (key === 'frame') {
-      cap = settings.frame ? CAP : LARGEST;
+      cap = settings.frame && CAP;
       frames = [];
-      wish({ cap });
-    } else if (key === 'wire') post('wire', { on: value });
-    else wish({ [key]: settings[key] });
+    }
+    want({ [key]: settings[key], cap });
     view?.look();
-    look();
     tell();
   }
 
-  /** Stop loading, or go on. */
-  function pause(on = true) {
-    set('paused', on);
-  }
-
-  /** Go to a level: 0 is the base, 1 the whole; between them as the slider. */
-  function level(part) {
-    set('level', part);
-  }
-
-  function wire(on) {
-    set('wire', on);
-  }
-
   function again() {
-    Object.assign(state, { message: '', failed: false });
-    panel.message('');
     post('again');
   }
 
@@ -226,37 +185,22 @@ function begin(element) {
   function look() {
     looking ||= setTimeout(() => {
       looking = 0;
-      if (!view) return;
-      views = view.views();
-      wish({ views });
-      tell();
+      want({ views: view.views() });
     }, 100);
   }
 
   /** The meshes that are there, byte for byte: [{ vertices, faces, edges, attributes }]. */
   function dump() {
     return new Promise((resolve) => {
-      const id = Math.random();
-      dumps.set(id, resolve);
-      post('dump', { id });
+      const { port1, port2 } = new MessageChannel();
+      port1.onmessage = ({ data }) => resolve(data);
+      post('dump', null, [port2]);
     });
   }
 
   // -- what is told ------------------------------------------------------------------------------------------------
 
-  /** The error on screen of what is shown, in pixels; -1 where unknown. */
-  function pixels() {
-    const seen = state.errors.map((error, mesh) => {
-      const { visible, scale } = views?.[mesh] ?? {};
-      return error && visible ? (error < 0 ? Infinity : error * scale) : 0;
-    });
-    const most = Math.max(-1, ...seen);
-    return most < Infinity ? most : -1;
-  }
-
   function tell() {
-    clearTimeout(telling);
-    telling = 0;
     const { shown, there, faces, identical, quantised, seconds, failed, waiting } = state;
     let text = shown ? 'refining' : 'loading';
     if (seconds) text = '';
@@ -266,7 +210,7 @@ function begin(element) {
     if (failed) text = 'stopped';
     const same = identical && shown === faces;
     if (same) text = quantised ? 'complete: equal to what was sent, hash checked' : 'identical to the original';
-    panel.figures({ ...state, pixels: pixels() }, text, same);
+    panel.figures(state, text, same);
   }
 
   function say(event, detail) {

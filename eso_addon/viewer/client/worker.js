@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The other thread: everything between the line and the buffers that are drawn.
 import { finest } from './finest.js';
-import { makeHeld, makeLine } from './line.js';
+import { makeLine } from './line.js';
 import { makePicture } from './picture.js';
 import { makeStream } from './stream.js';
 // what these import, named here so that all is asked for at once
@@ -15,34 +15,22 @@ import './fan.js';
 import './positions.js';
 
 const { url, wish } = JSON.parse(name);
-let stream = url && begin(makeLine(url));
+const stream = makeStream(makeLine(url), wish, show, (message) => postMessage(message));
 let pictures;
-let wire;
-
-function begin(line) {
-  return makeStream(line, wish, show, (message) => postMessage(message));
-}
 
 /** Hand the buffers of a new level over. */
 function show(places, first) {
   pictures ??= stream.meshes.map(makePicture);
-  const changes = pictures.map((picture, at) => (places[at] < 0 ? null : picture(places[at], wire)));
-  const arrays = changes.flatMap((change) => Object.values(change ?? {})).filter(ArrayBuffer.isView);
+  const changes = pictures.map((picture, at) => (places[at] < 0 ? null : picture(places[at], wish.wire)));
+  const arrays = changes.flatMap((change) => Object.values(change ?? {})).flat(2).filter(ArrayBuffer.isView);
   postMessage({ type: 'level', changes, first }, arrays.map((array) => array.buffer));
 }
 
 const actions = {
-  held({ base64 }) {
-    stream = begin(makeHeld(Uint8Array.from(atob(base64), (letter) => letter.charCodeAt(0))));
-  },
-  wish: (message) => stream.want(message.wish),
+  want: (wishes) => stream.want(wishes),
   drawn: () => stream.drawn(),
   again: () => stream.again(),
-  wire({ on }) {
-    wire = on;
-    stream.renew();
-  },
   /** The meshes as they are there, for whoever wants to look at every byte. */
-  dump: ({ id }) => postMessage({ type: 'dump', id, meshes: stream.meshes.map((mesh) => finest(mesh)) }),
+  dump: (_, [port]) => port.postMessage(stream.meshes.map((mesh) => finest(mesh))),
 };
-onmessage = ({ data }) => actions[data.type](data);
+onmessage = ({ data: [action, wishes], ports }) => actions[action](wishes, ports);
