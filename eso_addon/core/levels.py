@@ -85,7 +85,8 @@ def level(mesh: Prepared, record: CollapseRecord, original: Mesh, length: int,
     The refit may put `spare` vertices back.
     """
     vertices, faces = original
-    points, corners, face_map, survivor = record.level(vertices[mesh.source], mesh.faces.T, length)
+    given = vertices[mesh.source]
+    points, corners, face_map, survivor = record.level(given, mesh.faces.T, length)
     if mesh.turned is not None:
         turned = mesh.turned[face_map]
         corners[turned, 1:] = corners[turned, :0:-1]
@@ -96,20 +97,20 @@ def level(mesh: Prepared, record: CollapseRecord, original: Mesh, length: int,
     number[alive] = np.arange(len(alive))
     corners, placed = number.take(corners), points.take(alive, axis=0)
     merged = number.take(survivor)  # of the engine's vertices
-    held = np.zeros((len(placed), 3), bool)
-    if options.moves and length:
-        placed, held = into_planes(placed, corners, vertices[mesh.source].T, _borders(mesh, options), merged)
+    held, borders = np.zeros((len(placed), 3), bool), _borders(mesh, options)
+    if options.moves and length and borders.size:
+        placed, held = into_planes(placed, corners, given.T, borders, merged)
     fitted = Refitted.unfitted(placed, corners)
     if options.refit and options.moves and length:
         # the engine's vertices stand for the input's, so that seams stay closed
         fitted = refit(
-            placed, corners, vertices[mesh.source], mesh.faces.T, vertex_map=merged,
+            placed, corners, given, mesh.faces.T, vertex_map=merged,
             fixed=held if carrier is None else held | carrier.held(merged, len(placed))[:, None],
             bound=None if carrier is None else carrier.bound(merged, len(placed)),
             group=_sheets(mesh, faces, face_map) if carrier is None else carrier.sheets(face_map),
             flips=options.flips and (carrier is None or carrier.flips), spare=spare,
             apart=mesh.opened if carrier is None else mesh.opened | carrier.marked,
-            lines=_line_edges(mesh, options, carrier))
+            lines=borders if carrier is None else np.concatenate((borders, carrier.line_edges), axis=1))
     numbers = merged.copy()
     numbers[fitted.back] = len(placed) + np.arange(len(fitted.back))
     placed, corners, slots = fitted.vertices, fitted.faces, fitted.corner
@@ -134,12 +135,6 @@ def spare_of(count: int, options: Options, carrier: Carrier | None) -> int:
     if not (options.refit and options.moves and options.flips) or (carrier is not None and not carrier.reinserts):
         return 0
     return spare_vertices(count)
-
-
-def _line_edges(mesh: Prepared, options: Options, carrier: Carrier | None) -> Ints:
-    """Return the engine's edges, (2, l) int64, that a refit follows: open boundaries and lines."""
-    borders = _borders(mesh, options)
-    return borders if carrier is None else np.concatenate((borders, carrier.line_edges), axis=1)
 
 
 def _borders(mesh: Prepared, options: Options) -> Ints:
