@@ -300,7 +300,17 @@ def _operator(name: str) -> Callable[..., set[str]]:
 
 def _read_blend(path: Path) -> None:
     bpy.ops.wm.open_mainfile(filepath=str(path), load_ui=False, use_scripts=False)
+    _make_local()
     _make_instances_real()
+
+
+def _make_local() -> None:
+    """Put data of the file's own in the place of what it links from others, and of library overrides."""
+    if len(bpy.data.libraries):
+        active = bpy.context.view_layer.objects.active
+        if active is not None and active.mode != "OBJECT":  # as the file was saved; there it is not allowed
+            bpy.ops.object.mode_set(mode="OBJECT")
+        bpy.ops.object.make_local(type="ALL")
 
 
 def _make_instances_real() -> None:
