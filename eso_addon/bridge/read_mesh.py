@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ..core.attributes import Attribute
 from ..core.mesh import MeshError
+from .active_layers import read_active
 from .attributes import read_attribute
 from .layers import Layer, at_corners, for_engine, read_layers
 from .left_behind import lost_with_modifiers, unknown_attributes
@@ -279,15 +280,9 @@ def _carried_of(obj: bpy.types.Object, mesh: bpy.types.Mesh, keys: ShapeKeys | N
         mesh.corner_normals.foreach_get("vector", normals)
         normals = normals.reshape(-1, 3)
     custom = mesh.attributes.get("custom_normal")
-    active = {
-        "uv": mesh.uv_layers.active.name if mesh.uv_layers.active else "",
-        "uv_render": next((layer.name for layer in mesh.uv_layers if layer.active_render), ""),
-        "color": mesh.attributes.active_color_name or "",
-        "color_render": mesh.attributes.default_color_name or "",
-    }
     return {
         "layers": read_layers(mesh),
-        "active": active,
+        "active": read_active(mesh),
         "normals": normals,
         "free_normals": custom is not None and custom.data_type == "FLOAT_VECTOR",
         "groups": read_groups(obj, mesh, owner),

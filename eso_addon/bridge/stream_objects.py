@@ -226,7 +226,8 @@ def loaded_scene(path: Path, *, partial: bool = False) -> Scene:
     """Read a stream, or give the last one again if its file has not changed."""
     stat = path.stat()
     stamp = stat.st_mtime, stat.st_size
-    if path not in _loaded or _loaded[path][0] != stamp:
+    known = _loaded.get(path)
+    if known is None or known[0] != stamp or (known[1].damage and not partial):
         scene = load_scene(path, partial=partial)
         _loaded.clear()  # one is enough for a slider
         _loaded[path] = stamp, scene
