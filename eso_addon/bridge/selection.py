@@ -32,7 +32,8 @@ def is_part_selected(mesh: bpy.types.Mesh) -> bool:
 def marked_selection(obj: bpy.types.Object) -> Iterator[None]:
     """Mark the selected faces of an object in Edit Mode by an attribute."""
     edited = bmesh.from_edit_mesh(obj.data)
-    layer = edited.faces.layers.bool.new(MARK)
+    layers = edited.faces.layers.bool
+    layer = layers[MARK] if MARK in layers.keys() else layers.new(MARK)
     for face in edited.faces:  # in Edit Mode Blender has no quicker way
         face[layer] = face.select
     try:
