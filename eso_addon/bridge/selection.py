@@ -33,7 +33,7 @@ def marked_selection(obj: bpy.types.Object) -> Iterator[None]:
     """Mark the selected faces of an object in Edit Mode by an attribute."""
     edited = bmesh.from_edit_mesh(obj.data)
     layers = edited.faces.layers.bool
-    layer = layers[MARK] if MARK in layers.keys() else layers.new(MARK)
+    layer = layers.get(MARK) or layers.new(MARK)
     for face in edited.faces:  # in Edit Mode Blender has no quicker way
         face[layer] = face.select
     try:

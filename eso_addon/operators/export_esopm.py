@@ -13,6 +13,7 @@ from bpy_extras.io_utils import ExportHelper
 from ..core.errors import MeshError
 from ..core.steps import run_to_end, scaled
 from ..files.atomic import check_place
+from ..jobs.refusal import refuse
 from ..progressive.errors import StreamError
 from .polls import poll_with
 from .reports import tell
@@ -89,8 +90,7 @@ class EXPORT_MESH_OT_esopm(bpy.types.Operator, ExportHelper):
             if self.web_page:
                 write_page(path, path.with_suffix(".html"))
         except (MeshError, StreamError, OSError) as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
+            return refuse(self, error)
         finally:
             manager.progress_end()
         vertices = sum(mesh.vertex_count for mesh in scene.meshes)

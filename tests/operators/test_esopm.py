@@ -280,7 +280,7 @@ def test_the_page_is_not_written_over_the_stream(tmp_path: Path) -> None:
     with pytest.raises(RuntimeError, match="give another"):
         bpy.ops.export_mesh.esopm(filepath=str(tmp_path / "cube.html"), web_page=True)
     for path in ("", str(tmp_path)):
-        with pytest.raises(RuntimeError, match="cannot write"):
+        with pytest.raises(RuntimeError, match="Cannot write"):
             bpy.ops.export_mesh.esopm(filepath=path, web_page=True)
     assert not list(tmp_path.iterdir())
 
