@@ -86,7 +86,7 @@ def read_mesh(
     apply_modifiers : bool
         Read the mesh as modifiers leave it, not as it is stored.
     live : collection of str
-        Names of modifiers that are not to be in what is read.
+        Names of modifiers that are not to be in what is read; only with `carry`.
     depsgraph : bpy.types.Depsgraph, optional
         Where modifiers are evaluated; the context's by default.
     transform : ndarray, (4, 4) float64, optional
@@ -112,7 +112,7 @@ def read_mesh(
         transform = scale_transform(obj)
     if obj.data.is_editmode:
         obj.update_from_editmode()
-    with switched_off(obj, live):
+    with switched_off(obj, live) if carry else nullcontext():
         lost = lost_with_modifiers(obj, applied=apply_modifiers, live=live) if carry else []
         if apply_modifiers and (_has_modifiers(obj) or (not carry and obj.data.shape_keys is not None)):
             return _read_evaluated(obj, transform, depsgraph, lost, carry=carry, selection=selection)

@@ -4,13 +4,14 @@
 """The levels as a list to click on: each row is a view of one number in the text that the operators take."""
 
 from collections.abc import Callable, Sequence
+from math import isclose
 from typing import Any
 
 import bpy
 from bpy.props import FloatVectorProperty, IntVectorProperty
 
 from ..core.errors import MeshError
-from .level_text import TEXT_OF, read_levels, written
+from .level_text import TEXT_OF, read_levels, words_of, written
 
 MOST = 8
 _LARGEST = 2**31 - 1  # that Blender's properties hold
@@ -23,12 +24,16 @@ def _view(kind: str) -> dict[str, Callable[..., Any]]:
     is_whole = kind not in {"ratio", "error"}
 
     def get(self: Any) -> list[float]:  # noqa: ANN401 - the settings
-        found = [min(round(value), _LARGEST) if is_whole else value for value in _shown(self, kind)[:MOST]]
+        found = [max(min(round(value), _LARGEST), -_LARGEST) if is_whole else value
+                 for value in _shown(self, kind)[:MOST]]  # fmt: skip
         return found + [0 if is_whole else 0.0] * (MOST - len(found))
 
     def put(self: Any, values: Sequence[float]) -> None:  # noqa: ANN401
-        now = _shown(self, kind)
-        setattr(self, TEXT_OF[kind], written(kind, [*values[: len(now)], *now[MOST:]]))
+        words = words_of(getattr(self, TEXT_OF[kind])) if _shown(self, kind) else []
+        # what was not changed stays as it is written: a row may not show all of it
+        words[:MOST] = [word if isclose(old, new, rel_tol=1e-6) else written(kind, [new])
+                        for word, old, new in zip(words, get(self), values, strict=False)]  # fmt: skip
+        setattr(self, TEXT_OF[kind], ", ".join(words))
 
     return {"get": get, "set": put}
 

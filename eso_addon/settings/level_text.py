@@ -20,15 +20,19 @@ def read_levels(kind: str, text: str) -> list[float]:
     MeshError
         There are none, or something else stands there.
     """
-    words = text.replace(";", ",").replace(",", " ").split()
     try:
-        values = [float(int(word)) if kind in _COUNTS else float(word) for word in words]
+        values = [float(int(word)) if kind in _COUNTS else float(word) for word in words_of(text)]
     except (ValueError, OverflowError):
         values = []
     if not values or not all(map(isfinite, values)):
         example = "8000, 2000, 500" if kind in _COUNTS else "0.5, 0.25, 0.1"
         raise MeshError(f"levels '{text}' cannot be read: write numbers with commas between, such as {example}")
     return values
+
+
+def words_of(text: str) -> list[str]:
+    """Split a text into what should be its numbers."""
+    return text.replace(";", ",").replace(",", " ").split()
 
 
 def written(kind: str, values: Sequence[float]) -> str:

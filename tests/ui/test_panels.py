@@ -164,6 +164,8 @@ def test_rows_hold_large_numbers_and_drop_no_levels() -> None:
     settings = bpy.context.scene.eso_lod
     settings.faces_targets = "5000000000, 100"
     assert list(settings.row_count)[:2] == [2**31 - 1, 100]
+    settings.row_count[1] = 50
+    assert settings.faces_targets == "5000000000, 50"
     settings.ratios = "0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1"
     settings.row_ratio[0] = 0.95
     assert settings.ratios == "0.95, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1"
