@@ -239,6 +239,24 @@ def test_what_a_file_links_is_worked_on(kind: str, tmp_path: Path) -> None:
     assert library.read_bytes() == before
 
 
+def test_a_library_that_is_not_there_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    library, source = tmp_path / "library.blend", tmp_path / "source.blend"
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    add_sphere("Far", 3)
+    bpy.ops.wm.save_as_mainfile(filepath=str(library))
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    link(library, "objects")
+    add_sphere("Own", 3)
+    bpy.ops.wm.save_as_mainfile(filepath=str(source))
+    library.unlink()
+    for words in (["simplify", source, tmp_path / "out.glb", "--ratio", "0.5"],
+                  ["stream", source, tmp_path / "out.esopm"]):
+        capsys.readouterr()
+        assert run(*words) == 0
+        told = capsys.readouterr()
+        assert "files that are not there (library.blend)" in told.out + told.err
+
+
 def link(library: Path, kind: str) -> None:
     """Link the ball of a library in one of the ways that there are."""
     scene = bpy.context.scene
