@@ -34,9 +34,9 @@ def marked_selection(obj: bpy.types.Object) -> Iterator[None]:
     edited = bmesh.from_edit_mesh(obj.data)
     layers = edited.faces.layers.bool
     layer = layers.get(MARK) or layers.new(MARK)
-    for face in edited.faces:  # in Edit Mode Blender has no quicker way
-        face[layer] = face.select
     try:
+        for face in edited.faces:  # in Edit Mode Blender has no quicker way
+            face[layer] = face.select
         _store(obj)
         yield
     finally:

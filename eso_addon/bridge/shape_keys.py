@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-# In this order: a value is held within its limits.
+# In this order: a value is held within its limits, and each limit by the other, so that they are set twice.
 _SETTINGS = ("slider_min", "slider_max", "value", "mute", "lock_shape", "vertex_group", "interpolation")
 
 
@@ -122,7 +122,7 @@ def add_keys(obj: bpy.types.Object, shapes: Sequence[NDArray[np.float32]], entri
         relative = entry.get("relative")
         if type(relative) is int and 0 <= relative < len(shapes):
             block.relative_key = written.key_blocks[relative]
-        for name in _SETTINGS:
+        for name in (*_SETTINGS[:2], *_SETTINGS):
             if name in entry:
                 _set(block, name, entry[name])
     _set(written, "eval_time", timing.get("eval_time", 0.0))

@@ -151,7 +151,9 @@ def test_shape_keys_and_locks_come_back_as_they_are_set(relative: bool, tmp_path
     first, second, third = keys.key_blocks[1:]
     first.interpolation, first.lock_shape, first.vertex_group = "KEY_CARDINAL", True, "Open"
     second.mute, second.relative_key = True, first
-    third.slider_max, third.slider_min, third.value = 3.0, -2.0, 2.5
+    for key, least, most, value in ((second, -5.0, -2.0, -3.0), (third, 5.0, 9.0, 6.5)):
+        key.slider_min, key.slider_max = -10.0, most
+        key.slider_min, key.value = least, value
     keys.eval_time = 12.5
     path = exported(tmp_path / "keys.esopm", keep_order=True)
     new = imported(path)[0]
