@@ -13,7 +13,7 @@ from bpy.props import FloatVectorProperty, IntVectorProperty
 from ..core.errors import MeshError
 from .level_text import TEXT_OF, read_levels, words_of, written
 
-MOST = 8
+MOST = 8  # rows; a text may have more numbers, which then stand in the text alone
 _LARGEST = 2**31 - 1  # that Blender's properties hold
 # How the next level follows from the last one.
 _STEP = {"ratio": 0.5, "count": 0.5, "error": 3.0, "screen": 0.5, "budget": 0.5}
@@ -79,7 +79,8 @@ class LevelList:
         """Add a level after the last one, coarser than that."""
         values = self.level_values()
         last = values[-1] if values else (0.01 if self.levels_by == "error" else 1.0)
-        self._put([*values, last * _STEP[self.levels_by]])
+        if len(values) < MOST:
+            self._put([*values, last * _STEP[self.levels_by]])
 
     def remove_level(self) -> None:
         """Remove the last level, but for the only one."""
@@ -91,14 +92,15 @@ class LevelList:
         setattr(self, TEXT_OF[kind], written(kind, [max(value, least) for value in values]))
 
     def draw_rows(self, layout: bpy.types.UILayout, told: Sequence[str]) -> None:
-        """Draw a row for each level: its name, its number, and what is told of it; as text if they are no such rows."""
+        """Draw a row for each level: its name, its number, and what is told of it; the text where it cannot be read."""
         count = len(self.level_values())
-        if not 0 < count <= MOST:
-            layout.alert = count == 0
+        if not count:
+            layout.alert = True
             layout.prop(self, TEXT_OF[self.levels_by])
-            return
-        for index in range(count):
+        for index in range(min(count, MOST)):
             row = layout.row(align=True)
             split = row.split(factor=0.55, align=True)
             split.prop(self, f"row_{self.levels_by}", index=index, text=f"LOD{index}")
             split.label(text=told[index] if index < len(told) else "")
+        if count > MOST:
+            layout.label(text=f"+ {count - MOST}", translate=False)

@@ -169,7 +169,11 @@ def test_rows_hold_large_numbers_and_drop_no_levels() -> None:
     settings.ratios = "0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1"
     settings.row_ratio[0] = 0.95
     assert settings.ratios == "0.95, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1"
+    bpy.ops.scene.eso_level_add()
     assert len(settings.level_values()) == 9
+    rows = [name for kind, name, _ in drawn_by(panels.VIEW3D_PT_eso_levels) if (kind, name) == ("prop", "row_ratio")]
+    assert len(rows) == MOST
+    assert "+ 1" in labels(panels.VIEW3D_PT_eso_levels)
 
 
 def test_figures_stand_beside_the_levels_before_and_after() -> None:
