@@ -2,7 +2,6 @@
 """The command line: `python -m eso_addon WORD …` and `blender --command eso_lod WORD …`."""
 
 import argparse
-import json
 import sys
 import time
 from collections.abc import Callable, Sequence
@@ -16,6 +15,7 @@ from .cli_large import add_options as add_large_options
 from .cli_large import is_large, simplify_file
 from .cli_lod import add_options as add_lod_options
 from .cli_lod import finish, lod, make_chains, outcome
+from .cli_numbers import count, epsilon, length, ratio
 from .cli_serve import add_word as add_serve
 from .cli_stream import add_words as add_stream
 from .cli_stream import stream_path
@@ -147,15 +147,15 @@ def _parser() -> argparse.ArgumentParser:
     words = parser.add_subparsers(required=True, metavar="WORD")
     simplify = _add_word(words, "simplify", _simplify, "write a mesh with fewer triangles", "IN", "OUT")
     targets = simplify.add_mutually_exclusive_group(required=True)
-    targets.add_argument("--ratio", type=_ratio, metavar="R", help="share of the triangles to keep, of each mesh")
-    targets.add_argument("--faces", type=_count, metavar="N", help="triangles to keep, of all meshes together")
-    targets.add_argument("--max-error", type=_length, metavar="E", help="largest deviation, in the file's units")
-    targets.add_argument("--epsilon", type=_epsilon, metavar="X",
+    targets.add_argument("--ratio", type=ratio, metavar="R", help="share of the triangles to keep, of each mesh")
+    targets.add_argument("--faces", type=count, metavar="N", help="triangles to keep, of all meshes together")
+    targets.add_argument("--max-error", type=length, metavar="E", help="largest deviation, in the file's units")
+    targets.add_argument("--epsilon", type=epsilon, metavar="X",
                          help="method feature: go on until only features are left, those whose weight is below X")
     add_large_options(simplify)
     _add_engine_words(simplify)
     lod = _add_word(words, "lod", run_lod, "write several levels of detail", "IN", "OUT")
-    add_lod_options(lod, _ratio, _count, _length)
+    add_lod_options(lod)
     _add_engine_words(lod)
     _add_word(words, "measure", _measure, "say how far a mesh is from another", "ORIGINAL", "SIMPLIFIED")
     add_stream(words, _path, FORMATS, METHODS)
@@ -165,7 +165,7 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _add_lod_words(batch: argparse.ArgumentParser) -> None:
-    add_lod_options(batch, _ratio, _count, _length, required=False)
+    add_lod_options(batch, required=False)
     _add_engine_words(batch)
 
 
@@ -189,11 +189,11 @@ def _add_engine_words(parser: argparse.ArgumentParser) -> None:
     """Add the engine's options; one that is not given is left to the engine."""
     parser.argument_default = argparse.SUPPRESS
     parser.add_argument("--method", choices=METHODS, help="how edges are weighed (default: eso)")
-    parser.add_argument("--rings", type=_count, metavar="N", help="rings of neighbours that a weight looks at")
+    parser.add_argument("--rings", type=count, metavar="N", help="rings of neighbours that a weight looks at")
     parser.add_argument("--preset", choices=("paper",), help="the equations as the paper prints them")
     parser.add_argument("--placement", choices=("optimal", "endpoint"), help="where a new vertex stands")
-    parser.add_argument("--prune", type=_length, metavar="SIZE", help="drop loose parts smaller than this")
-    parser.add_argument("--threads", type=_count, metavar="N", help="of the engine (default: 1; 2 for large meshes)")
+    parser.add_argument("--prune", type=length, metavar="SIZE", help="drop loose parts smaller than this")
+    parser.add_argument("--threads", type=count, metavar="N", help="of the engine (default: 1; 2 for large meshes)")
     parser.add_argument("--no-weld", dest="weld", action="store_false", help="keep vertices at equal positions apart")
     parser.add_argument("--symmetry", choices=("x", "y", "z"), help="symmetric results of symmetric meshes")
     for line, title in _LINES.items():
@@ -207,43 +207,21 @@ def _path(word: str) -> Path:
     return path
 
 
-def _ratio(word: str) -> float:
-    return _number(word, lambda ratio: 0 < ratio <= 1, "a ratio above 0 and at most 1")
-
-
-def _length(word: str) -> float:
-    return _number(word, lambda length: 0 <= length < float("inf"), "a length, 0 or more")
-
-
-def _epsilon(word: str) -> float:
-    return _number(word, lambda epsilon: -1 <= epsilon <= 1, "a number from -1 to 1")
-
-
-def _count(word: str) -> int:
-    return int(_number(word, lambda count: count >= 1 and count == int(count), "a whole number, 1 or more"))
-
-
-def _number(word: str, is_valid: Callable[[float], bool], wanted: str) -> float:
-    try:
-        number = float(word)
-        if is_valid(number):
-            return number
-    except (ValueError, OverflowError):
-        pass
-    raise argparse.ArgumentTypeError(f"{word} is not {wanted}")
-
-
 def _simplify(args: argparse.Namespace) -> None:
     from .files.atomic import check_place
     from .settings.lod_record import LodSettings
 
-    check_place(args.output, args.json)
+    check_place(args.output)
+    check_place(args.json, unlike=(args.input, args.output))
     options = _engine_options(args)
     if args.epsilon is not None and options.setdefault("method", "feature") != "feature":
         raise ValueError("--epsilon belongs to --method feature: leave out one of them")
     if is_large(args):
         simplify_file(args, options)
         return
+    if args.workers is not None or args.scheduler:
+        print("--workers and --scheduler do nothing here: they are for files read in pieces (--memory-limit)",
+              file=sys.stderr)
     model = _open(args.input, args.output)
     started = time.perf_counter()
     if args.epsilon is not None:
@@ -273,9 +251,6 @@ def _simplify_to_epsilon(part: "Part", options: dict[str, Any]) -> "SimplifyResu
 
 def run_lod(args: argparse.Namespace) -> None:
     """Write the levels of one file."""
-    from .files.atomic import check_place
-
-    check_place(args.output, args.json)
     lod(args, _open, _engine_options(args))
 
 
@@ -318,8 +293,9 @@ def _report(
 def _measure(args: argparse.Namespace) -> None:
     from .core.deviation import measure
     from .files.atomic import check_place
+    from .files.figures import write_figures
 
-    check_place(args.json)
+    check_place(args.json, unlike=(args.input, args.output))
     deviation = measure(*_triangles(args.input), *_triangles(args.output))
     rows = {
         f"{args.input.name} to {args.output.name}": deviation.forward,
@@ -334,7 +310,7 @@ def _measure(args: argparse.Namespace) -> None:
     parts = "".join(f"{value / deviation.diagonal:14.6f}" for value in (worst.maximum, worst.mean, worst.rms))
     print("of the diagonal".ljust(width) + parts)
     if args.json:
-        _write_json(args.json, _figures(deviation))
+        write_figures(args.json, _figures(deviation))
 
 
 def _triangles(path: Path) -> "tuple[NDArray[np.float64], NDArray[np.int64]]":
@@ -348,10 +324,3 @@ def _figures(deviation: "Deviation") -> dict[str, Any]:
         name: {kind: float(getattr(getattr(deviation, name), kind)) for kind in ("maximum", "mean", "rms", "normal")}
         for name in ("forward", "backward", "symmetric")
     } | {"diagonal": float(deviation.diagonal)}
-
-
-def _write_json(path: Path, figures: dict[str, Any]) -> None:
-    from .files.atomic import atomic_output
-
-    with atomic_output(path) as draft:
-        draft.write_text(json.dumps(figures, indent=2) + "\n", encoding="utf-8")

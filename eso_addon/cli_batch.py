@@ -12,6 +12,8 @@ from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from .cli_numbers import seconds
+
 if TYPE_CHECKING:
     from .farm.ledger import Ledger
 
@@ -34,7 +36,7 @@ def add_word(words: Any, add_lod: Callable[[argparse.ArgumentParser], None],  # 
     where = batch.add_mutually_exclusive_group()
     where.add_argument("--scheduler", default="", metavar="ADDRESS", help="of a Dask scheduler, as tcp://host:8786")
     where.add_argument("--workers", type=workers, metavar="N", help="processes on this computer (default: all cores)")
-    batch.add_argument("--timeout", type=_seconds, default=1800.0, metavar="S", help="seconds for one file (1800)")
+    batch.add_argument("--timeout", type=seconds, default=1800.0, metavar="S", help="seconds for one file (1800)")
     batch.add_argument("--memory-limit", type=memory, metavar="SIZE",
                        help="memory of one worker, as 4G (default: its share of this computer's)")
     batch.add_argument("--format", choices=formats, help="what the levels' files are (default: as the files)")
@@ -60,15 +62,6 @@ def workers(word: str) -> int:
     if word.isascii() and word.isdigit() and 1 <= int(word) <= 1024:
         return int(word)
     raise argparse.ArgumentTypeError(f"{word} is no number of workers: give 1 or more")
-
-
-def _seconds(word: str) -> float:
-    try:
-        if 0 < float(word) < 1e9:
-            return float(word)
-    except ValueError:
-        pass
-    raise argparse.ArgumentTypeError(f"{word} is no time: give seconds, more than 0")
 
 
 def run(args: argparse.Namespace, formats: Sequence[str]) -> None:

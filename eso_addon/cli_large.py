@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 import tempfile
 import time
@@ -140,7 +139,7 @@ def _tell(text: str) -> None:
 
 
 def _report(args: argparse.Namespace, source: Any, result: Any, seconds: float) -> None:  # noqa: ANN401
-    from .files.atomic import atomic_output
+    from .files.figures import write_figures
 
     lost = [f"{args.input.stem}: not carried over: {', '.join(source.left_behind)}"] if source.left_behind else []
     told = "".join(f"; {text}" for text in result.messages)
@@ -154,5 +153,4 @@ def _report(args: argparse.Namespace, source: Any, result: Any, seconds: float) 
                 "messages": list(result.messages), "switch_distance": None}
         figures = {"input": str(args.input), "output": [str(args.output)], "seconds": seconds, "meshes": [mesh],
                    "not_carried_over": lost}
-        with atomic_output(args.json) as draft:
-            draft.write_text(json.dumps(figures, indent=2) + "\n", encoding="utf-8")
+        write_figures(args.json, figures)

@@ -11,6 +11,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from .cli_numbers import count, length, list_of, ratio
 from .core.steps import run_to_end
 from .settings.profiles import PROFILES, Profile
 
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
     from .core.levels import SimplifyResult
 
 HULLS = ("none", "one", "parts")
-Read = Callable[[str], float]
 
 
 @dataclass(frozen=True)
@@ -36,15 +36,14 @@ class Outcome:
     switch_distance: float | None = None
 
 
-def add_options(lod: argparse.ArgumentParser, ratio: Read, count: Read, length: Read, *,
-                required: bool = True) -> None:
+def add_options(lod: argparse.ArgumentParser, *, required: bool = True) -> None:
     """Add what `lod` takes besides the files and the engine's options."""
     targets = lod.add_mutually_exclusive_group(required=required)
-    targets.add_argument("--ratios", type=_list_of(ratio), metavar="R,R,…", help="share of triangles at each level")
-    targets.add_argument("--faces", type=_list_of(count), metavar="N,N,…",
+    targets.add_argument("--ratios", type=list_of(ratio), metavar="R,R,…", help="share of triangles at each level")
+    targets.add_argument("--faces", type=list_of(count), metavar="N,N,…",
                          help="triangles at each level, of all meshes together")
-    targets.add_argument("--errors", type=_list_of(length), metavar="E,E,…", help="largest deviation at each level")
-    targets.add_argument("--sizes", type=_list_of(count), metavar="P,P,…",
+    targets.add_argument("--errors", type=list_of(length), metavar="E,E,…", help="largest deviation at each level")
+    targets.add_argument("--sizes", type=list_of(count), metavar="P,P,…",
                          help="pixels of the longest side on screen where each level begins")
     lod.add_argument("--profile", choices=PROFILES, default="plain", help="the engine that names the levels")
     lod.add_argument("--hulls", choices=HULLS, default="none", help="collision hulls: one, or one for each part")
@@ -55,6 +54,7 @@ def add_options(lod: argparse.ArgumentParser, ratio: Read, count: Read, length: 
 
 def lod(args: argparse.Namespace, open_model: Callable[[Path, Path], Any], options: dict[str, Any]) -> None:
     """Write the levels of a file's visible meshes."""
+    from .files.atomic import check_place
     from .settings.lod_record import LodSettings, ordered_goals
 
     profile = PROFILES[args.profile]
@@ -65,6 +65,10 @@ def lod(args: argparse.Namespace, open_model: Callable[[Path, Path], Any], optio
         raise ValueError(reason)
     if args.hulls != "none" and not profile.hull:
         raise ValueError(f"{profile.label} has no names for collision hulls: leave out --hulls")
+    stem, numbers = args.output.stem, range(len(goals))
+    check_place(args.output)
+    check_place(args.json, unlike=[args.input, args.output,
+                                   *(args.output.with_stem(profile.name(stem, number)) for number in numbers)])
     screen = {"resolution": args.resolution, "lens": args.lens, "pixels": args.pixels}
     settings = LodSettings(kind, goals, screen, options, True, ["ARMATURE"], profile.key)
     model = open_model(args.input, args.output)
@@ -111,7 +115,7 @@ def report(args: argparse.Namespace, model: Any, chains: Sequence[Chain], profil
 def finish(args: argparse.Namespace, model: Any, outcomes: Sequence[Outcome], seconds: float,  # noqa: ANN401
            written: list[Path]) -> None:
     """Say what was written, and write the figures to a file if that was asked for."""
-    from .files.atomic import atomic_output
+    from .files.figures import write_figures
 
     for note in model.left_behind:
         print(note)
@@ -119,15 +123,10 @@ def finish(args: argparse.Namespace, model: Any, outcomes: Sequence[Outcome], se
     if args.json:
         figures = {"input": str(args.input), "output": [str(path) for path in written], "seconds": seconds,
                    "meshes": [asdict(found) for found in outcomes], "not_carried_over": model.left_behind}
-        with atomic_output(args.json) as draft:
-            draft.write_text(json.dumps(figures, indent=2) + "\n", encoding="utf-8")
+        write_figures(args.json, figures)
 
 
 def outcome(name: str, level: int, before: int, result: SimplifyResult, distance: float | None = None) -> Outcome:
     """Gather what is told of one mesh at one level."""
     return Outcome(name, level, before, len(result.faces), float(result.error), bool(result.reached),
                    tuple(result.messages), distance)
-
-
-def _list_of(read: Read) -> Callable[[str], list[float]]:
-    return lambda words: [read(word) for word in words.split(",")]

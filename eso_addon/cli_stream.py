@@ -10,6 +10,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from .cli_numbers import bits, count, epsilon
+
 if TYPE_CHECKING:
     from .progressive.progressive import Level
     from .progressive.scene import Scene
@@ -27,9 +29,9 @@ def add_words(words: Any, mesh_path: Callable[[str], Path], formats: Sequence[st
     stream.add_argument("input", type=mesh_path, metavar="IN", help=one_of)
     stream.add_argument("output", type=stream_path, metavar="OUT", help=f"a {ENDING} file")
     stream.add_argument("--method", choices=methods, help="which edges go first (default: qem)")
-    stream.add_argument("--epsilon", type=_epsilon, metavar="X",
+    stream.add_argument("--epsilon", type=epsilon, metavar="X",
                         help="for the method feature: hold edges whose virtual edge weighs less, from -1 to 1")
-    stream.add_argument("--bits", type=_bits, metavar="N", help="bits of a coordinate, 4 to 24; lossless without")
+    stream.add_argument("--bits", type=bits, metavar="N", help="bits of a coordinate, 4 to 24; lossless without")
     stream.add_argument("--keep-order", action="store_true", help="keep the order of vertices and faces")
     restore = words.add_parser("restore", help="write a level of a stream",
                                description="Write the original of a stream, or a level of it.")
@@ -37,8 +39,8 @@ def add_words(words: Any, mesh_path: Callable[[str], Path], formats: Sequence[st
     restore.add_argument("input", type=stream_path, metavar="IN", help=f"a {ENDING} file")
     restore.add_argument("output", type=mesh_path, metavar="OUT", help=f"{one_of}; exact in .blend, .glb and .ply")
     limits = restore.add_mutually_exclusive_group()
-    limits.add_argument("--faces", type=_count, metavar="N", help="triangles at most, of all meshes together")
-    limits.add_argument("--bytes", type=_count, metavar="N", help="use so many bytes of the file")
+    limits.add_argument("--faces", type=count, metavar="N", help="triangles at most, of all meshes together")
+    limits.add_argument("--bytes", type=count, metavar="N", help="use so many bytes of the file")
     restore.add_argument("--partial", action="store_true", help="of a damaged file, write what is good")
     info = words.add_parser("info", help="say what a stream holds", description="Say what a stream holds.")
     info.set_defaults(run=_info)
@@ -50,33 +52,6 @@ def stream_path(word: str) -> Path:
     if Path(word).suffix.lower() != ENDING:
         raise argparse.ArgumentTypeError(f"{word} must end in {ENDING}")
     return Path(word)
-
-
-def _whole(word: str, least: int, most: float) -> int:
-    try:
-        if least <= int(word) <= most:
-            return int(word)
-    except ValueError:
-        pass
-    span = f"{least} or more" if most == float("inf") else f"from {least} to {most}"
-    raise argparse.ArgumentTypeError(f"{word} is not a whole number, {span}")
-
-
-def _count(word: str) -> int:
-    return _whole(word, 1, float("inf"))
-
-
-def _bits(word: str) -> int:
-    return _whole(word, 4, 24)
-
-
-def _epsilon(word: str) -> float:
-    try:
-        if -1 <= float(word) <= 1:
-            return float(word)
-    except ValueError:
-        pass
-    raise argparse.ArgumentTypeError(f"{word} is not a number from -1 to 1")
 
 
 def _stream(args: argparse.Namespace) -> None:

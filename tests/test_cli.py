@@ -277,6 +277,37 @@ def test_places_are_looked_at_before_the_work(words: list[str], ball: Path, monk
     assert [path.name for path in ball.parent.iterdir()] == ["ball.off"]
 
 
+@pytest.mark.parametrize("words", [
+    ["simplify", "ball.off", "out.off", "--ratio", "0.5", "--json", "out.off"],
+    ["simplify", "ball.off", "out.off", "--ratio", "0.5", "--json", "ball.off"],
+    ["simplify", "ball.off", "out.off", "--ratio", "0.5", "--json", "../FOLDER/here/../ball.off"],
+    ["lod", "ball.off", "out.off", "--ratios", "0.5", "--json", "out.off"],
+    ["lod", "ball.off", "out.off", "--ratios", "0.5,0.2", "--json", "out_LOD1.off"],
+    ["lod", "ball.off", "out.off", "--ratios", "0.5", "--json", "ball.off"],
+    ["measure", "ball.off", "ball.off", "--json", "ball.off"],
+])
+def test_figures_are_written_over_no_mesh(words: list[str], ball: Path, monkeypatch: pytest.MonkeyPatch,
+                                          capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.chdir(ball.parent)
+    (ball.parent / "here").mkdir()
+    before = ball.read_bytes()
+    assert run(*(word.replace("FOLDER", ball.parent.name) for word in words)) == 1
+    out, err = capsys.readouterr()
+    assert "give another" in err
+    assert err.count("\n") == 1
+    assert out == ""
+    assert ball.read_bytes() == before
+    assert sorted(path.name for path in ball.parent.iterdir()) == ["ball.off", "here"]
+
+
+@pytest.mark.parametrize("words", [["--workers", "2"], ["--scheduler", "tcp://nobody:1"]])
+def test_workers_without_pieces_are_told(words: list[str], ball: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("simplify", ball, ball.with_stem("out"), "--ratio", "0.5", *words) == 0
+    err = capsys.readouterr().err
+    assert "--memory-limit" in err
+    assert err.count("\n") == 1
+
+
 def test_a_count_that_is_out_of_reach_is_told(ball: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     words = ["simplify", ball, tmp_path / "out.off", "--json", tmp_path / "out.json"]
     assert run(*words, "--faces", 1) == 0

@@ -10,6 +10,7 @@ import pytest
 
 from eso_addon.cli import main
 from eso_addon.files.off import write_off
+from tests.bridge.blender_scenes import add_sphere
 from tests.bridge.fbx import children_of, read_fbx, types_of
 from tests.core.shapes import ball, noisy
 
@@ -207,3 +208,72 @@ def test_instances_of_collections_share_their_levels(tmp_path: Path) -> None:
     levels = [node for node in file["nodes"] if "mesh" in node]
     assert len(levels) == 3
     assert len(file["meshes"]) == 1
+
+
+@pytest.mark.parametrize("kind", ["objects", "meshes", "collections", "instance", "overrides"])
+def test_what_a_file_links_is_worked_on(kind: str, tmp_path: Path) -> None:
+    """In the file that is written nothing is linked any more, and the other file is as it was."""
+    library, source, target = (tmp_path / f"{name}.blend" for name in ("library", "source", "target"))
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    obj = add_sphere("Far", 3)
+    obj.modifiers.new("Thick", "SOLIDIFY")
+    bpy.context.scene.collection.objects.unlink(obj)
+    group = bpy.data.collections.new("Things")
+    bpy.context.scene.collection.children.link(group)
+    group.objects.link(obj)
+    bpy.ops.wm.save_as_mainfile(filepath=str(library))
+    before = library.read_bytes()
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    link(library, kind)
+    add_sphere("Own", 3)
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.wm.save_as_mainfile(filepath=str(source))
+    count = 160 if kind == "meshes" else 320
+    for words in (["simplify", "--ratio", "0.5"], ["lod", "--ratios", "0.5"]):
+        report = tmp_path / "figures.json"
+        assert run(words[0], source, target, *words[1:], "--json", report) == 0
+        assert {mesh["triangles_after"] for mesh in figures(report)} == {160, count}
+        made = [thing for thing in read(target).values() if thing.name in bpy.context.scene.objects]
+        assert not any(thing.library or thing.data.library for thing in made)
+        assert sum(len(thing.data.polygons) for thing in made) == 160 + count
+    assert library.read_bytes() == before
+
+
+def test_a_library_that_is_not_there_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    library, source = tmp_path / "library.blend", tmp_path / "source.blend"
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    add_sphere("Far", 3)
+    bpy.ops.wm.save_as_mainfile(filepath=str(library))
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    link(library, "objects")
+    add_sphere("Own", 3)
+    bpy.ops.wm.save_as_mainfile(filepath=str(source))
+    library.unlink()
+    for words in (["simplify", source, tmp_path / "out.glb", "--ratio", "0.5"],
+                  ["stream", source, tmp_path / "out.esopm"]):
+        capsys.readouterr()
+        assert run(*words) == 0
+        told = capsys.readouterr()
+        assert "files that are not there (library.blend)" in told.out + told.err
+
+
+def link(library: Path, kind: str) -> None:
+    """Link the ball of a library in one of the ways that there are."""
+    scene = bpy.context.scene
+    names = {"objects": "Far", "meshes": "Far"}
+    with bpy.data.libraries.load(str(library), link=True) as (_, ours):
+        setattr(ours, kind if kind in names else "collections", [names.get(kind, "Things")])
+    if kind == "objects":
+        scene.collection.objects.link(bpy.data.objects["Far"])
+    elif kind == "meshes":
+        scene.collection.objects.link(bpy.data.objects.new("Near", bpy.data.meshes["Far"]))
+    elif kind == "instance":
+        empty = bpy.data.objects.new("Here", None)
+        empty.instance_type, empty.instance_collection = "COLLECTION", bpy.data.collections["Things"]
+        scene.collection.objects.link(empty)
+    else:
+        scene.collection.children.link(bpy.data.collections["Things"])
+        if kind == "overrides":
+            group = bpy.data.collections["Things"]
+            group.override_hierarchy_create(scene, bpy.context.view_layer)
+            scene.collection.children.unlink(group)

@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 
 from ..core.attributes import Attribute
 from .attributes import ATTRIBUTE_TYPES, read_attribute, write_attribute
+from .selection import MARK
 
 # Made anew by Blender, or written apart.
-_APART = {"position", "custom_normal", ".edge_verts", ".corner_vert", ".corner_edge"}
+_APART = {"position", "custom_normal", ".edge_verts", ".corner_vert", ".corner_edge", MARK}
 # Of the editors: what was selected or hidden there has no meaning on another mesh.
 _EDITORS = (".select_", ".hide_", ".uv_select_", ".vs.", ".es.")
 _LINES = {"uv_seam": "seam", ".uv_seam": "seam", "sharp_edge": "sharp", "crease_edge": "sharp",

@@ -13,7 +13,7 @@ from ..core.mesh import MeshError
 from . import level_info
 from .fingerprint import fingerprint, modifier_settings
 from .level_names import take_name
-from .modifiers import live_modifiers, switched_off
+from .modifiers import live_modifiers
 from .place_levels import LevelMesh, note_materials
 from .read_mesh import MeshArrays, read_mesh
 from .regions import group_options
@@ -85,8 +85,7 @@ def read_sources(meshes: Iterable[bpy.types.Object], *, apply_modifiers: bool,
     for group in groups.values():
         group.sort(key=_volume, reverse=True)
         live = live_modifiers(group[0], live_types) if apply_modifiers else []
-        with switched_off(group[0], live):
-            arrays = read_mesh(group[0], apply_modifiers=apply_modifiers, carry=True)
+        arrays = read_mesh(group[0], apply_modifiers=apply_modifiers, live=live, carry=True)
         if len(arrays.triangles):
             sources.append(LodSource(group, arrays, live))
     return sources

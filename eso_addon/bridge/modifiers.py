@@ -7,7 +7,8 @@ from contextlib import contextmanager
 import bpy
 
 _ANYWHERE = {"ARMATURE"}  # what is simplified is the mesh at rest, whatever comes before or after
-_SIMULATED = {"CLOTH", "SOFT_BODY", "COLLISION", "DYNAMIC_PAINT"}  # never put into a mesh: they go on on the new one
+# Never put into a mesh: they go on on the new one.
+_SIMULATED = {"CLOTH", "SOFT_BODY", "COLLISION", "DYNAMIC_PAINT", "FLUID", "PARTICLE_SYSTEM", "SURFACE"}
 
 
 def live_modifiers(obj: bpy.types.Object, types: Collection[str]) -> list[str]:
@@ -45,6 +46,11 @@ def switched_off(obj: bpy.types.Object, names: Collection[str]) -> Iterator[None
     finally:
         for modifier in shown:
             modifier.show_viewport = True
+
+
+def is_bound(modifier: bpy.types.Modifier) -> bool:
+    """Tell whether a modifier holds data for each vertex of the mesh that it was bound to."""
+    return bool(getattr(modifier, "is_bound", False) or getattr(modifier, "is_bind", False))
 
 
 def keep_modifiers(obj: bpy.types.Object, names: Collection[str]) -> None:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A mesh object as arrays: triangles as Blender makes them, in the size that the object has in the scene."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,9 +12,12 @@ from numpy.typing import NDArray
 
 from ..core.attributes import Attribute
 from ..core.mesh import MeshError
+from .active_layers import read_active
 from .attributes import read_attribute
 from .layers import Layer, at_corners, for_engine, read_layers
-from .left_behind import names_left_behind
+from .left_behind import lost_with_modifiers, unknown_attributes
+from .modifiers import switched_off
+from .selection import is_part_selected, marked_faces, marked_selection, selected_faces
 from .shape_keys import ShapeKeys, read_keys, with_shapes
 from .vertex_groups import VertexGroups, read_groups
 
@@ -36,7 +39,7 @@ class MeshArrays:
     materials: tuple["bpy.types.Material | None", ...]
     left_behind: tuple[str, ...]  # data that simplified meshes lose, by name
     template: bpy.types.Mesh  # for what a mesh has besides elements
-    selected: NDArray[np.bool_]  # (m,)
+    selected: NDArray[np.bool_] | None = None  # (m,); None where all faces are, or none is, or nobody asked
     layers: tuple[Layer, ...] = ()
     active: dict[str, str] | None = None  # names of active and rendered layers
     normals: NDArray[np.float32] | None = None  # (corners, 3) custom normals
@@ -60,17 +63,19 @@ class MeshArrays:
         return {"attributes": attributes, "edges": self.edges} if attributes else {}
 
 
-# What these are called beside the mesh's own attributes.
-NORMALS, GROUPS, KEYS = "custom normals", "vertex groups", "shape keys"
+# What these are called beside the mesh's own attributes, whose names cannot hold this character.
+NORMALS, GROUPS, KEYS = "\0custom normals", "\0vertex groups", "\0shape keys"
 
 
 def read_mesh(
     obj: bpy.types.Object,
     *,
     apply_modifiers: bool = True,
+    live: Collection[str] = (),
     depsgraph: bpy.types.Depsgraph | None = None,
     transform: NDArray[np.float64] | None = None,
     carry: bool = False,
+    selection: bool = False,
 ) -> MeshArrays:
     """Read a mesh object, in Edit Mode too.
 
@@ -80,6 +85,8 @@ def read_mesh(
         A mesh object; may be linked or hidden.
     apply_modifiers : bool
         Read the mesh as modifiers leave it, not as it is stored.
+    live : collection of str
+        Names of modifiers that are not to be in what is read; only with `carry`.
     depsgraph : bpy.types.Depsgraph, optional
         Where modifiers are evaluated; the context's by default.
     transform : ndarray, (4, 4) float64, optional
@@ -87,6 +94,8 @@ def read_mesh(
     carry : bool
         Read all that the mesh carries, and the neutral shape of a mesh with shape keys; without it only the shape,
         with its keys as they are mixed now.
+    selection : bool
+        Read which faces are selected; the object is in Edit Mode.
 
     Returns
     -------
@@ -95,7 +104,7 @@ def read_mesh(
     Raises
     ------
     MeshError
-        Not a mesh, a scale of zero, or modifiers that Blender does not evaluate.
+        Not a mesh, a scale of zero, modifiers that Blender does not evaluate, or that lose the selection.
     """
     if obj.type != "MESH":
         raise MeshError(f"'{obj.name}' is no mesh: convert it first (Object > Convert > Mesh)")
@@ -103,49 +112,69 @@ def read_mesh(
         transform = scale_transform(obj)
     if obj.data.is_editmode:
         obj.update_from_editmode()
-    keys = read_keys(obj.data) if carry else None
-    if apply_modifiers and (_has_modifiers(obj) or (not carry and obj.data.shape_keys is not None)):
-        depsgraph = depsgraph or bpy.context.evaluated_depsgraph_get()
-        lost = ""
-        if keys is not None:
-            keys, lost = _evaluated_keys(obj, keys, depsgraph)
-        with _shown_key(obj, 0 if keys is not None else None), evaluated_mesh(obj, depsgraph) as mesh:
-            return _arrays_of(obj, mesh, transform, keys, obj.evaluated_get(depsgraph) if carry else None, lost)
-    with stored_mesh(obj) as mesh:
-        return _arrays_of(obj, mesh, transform, keys, obj if carry else None)
+    with switched_off(obj, live) if carry else nullcontext():
+        lost = lost_with_modifiers(obj, applied=apply_modifiers, live=live) if carry else []
+        if apply_modifiers and (_has_modifiers(obj) or (not carry and obj.data.shape_keys is not None)):
+            return _read_evaluated(obj, transform, depsgraph, lost, carry=carry, selection=selection)
+        with stored_mesh(obj) as mesh:
+            selected = selected_faces(mesh) if selection and is_part_selected(mesh) else None
+            keys = read_keys(obj.data) if carry else None
+            return _arrays_of(obj, mesh, transform, keys, obj if carry else None, lost, selected)
 
 
 def _has_modifiers(obj: bpy.types.Object) -> bool:
     return any(modifier.show_viewport for modifier in obj.modifiers)
 
 
+def _read_evaluated(obj: bpy.types.Object, transform: NDArray[np.float64], depsgraph: bpy.types.Depsgraph | None,
+                    lost: list[str], *, carry: bool, selection: bool) -> MeshArrays:
+    """Read a mesh as modifiers leave it."""
+    if selection:
+        with stored_mesh(obj) as mesh:
+            selection = is_part_selected(mesh)
+    keys = read_keys(obj.data) if carry else None
+    with marked_selection(obj) if selection else nullcontext():
+        depsgraph = depsgraph or bpy.context.evaluated_depsgraph_get()
+        neutral = None if keys is None else 0
+        if keys is not None:
+            keys = _evaluated_keys(obj, keys, depsgraph, lost)
+        with _shown_key(obj, neutral), evaluated_mesh(obj, depsgraph) as mesh:
+            selected = marked_faces(mesh) if selection else None
+            owner = obj.evaluated_get(depsgraph) if carry else None
+            return _arrays_of(obj, mesh, transform, keys, owner, lost, selected)
+
+
 @contextmanager
 def _shown_key(obj: bpy.types.Object, number: int | None) -> Iterator[None]:
-    """Have Blender evaluate an object with one of its shape keys alone."""
+    """Have Blender evaluate an object with one of its shape keys alone, the whole of it."""
     if number is None:
         yield
         return
-    before = obj.show_only_shape_key, obj.active_shape_key_index
+    key = obj.data.shape_keys.key_blocks[number]
+    before = obj.show_only_shape_key, obj.active_shape_key_index, key.mute, key.vertex_group
     try:
         obj.show_only_shape_key, obj.active_shape_key_index = True, number
+        # a muted key would show the neutral shape, one with a vertex group a part of itself
+        key.mute, key.vertex_group = False, ""
         bpy.context.view_layer.update()
         yield
     finally:
-        obj.show_only_shape_key, obj.active_shape_key_index = before
+        obj.show_only_shape_key, obj.active_shape_key_index, key.mute, key.vertex_group = before
         bpy.context.view_layer.update()
 
 
-def _evaluated_keys(obj: bpy.types.Object, keys: ShapeKeys,
-                    depsgraph: bpy.types.Depsgraph) -> tuple[ShapeKeys | None, str]:
-    """Read shape keys as modifiers leave them; if these do not leave all of them the same vertices, say so."""
+def _evaluated_keys(obj: bpy.types.Object, keys: ShapeKeys, depsgraph: bpy.types.Depsgraph,
+                    lost: list[str]) -> ShapeKeys | None:
+    """Read shape keys as modifiers leave them; if these do not leave all of them the same vertices, note the loss."""
     shapes = []
     for number in range(len(keys.names)):
         with _shown_key(obj, number), evaluated_mesh(obj, depsgraph) as mesh:
             positions = read_attribute(mesh, "position")
             shapes.append(np.zeros((0, 3), np.float32) if positions is None else positions)
     if len({len(shape) for shape in shapes}) > 1:
-        return None, f"shape keys ({', '.join(keys.names)}): modifiers make another mesh of each"
-    return with_shapes(keys, np.stack(shapes)), ""
+        lost.append(f"shape keys ({', '.join(keys.names)}): modifiers make another mesh of each")
+        return None
+    return with_shapes(keys, np.stack(shapes))
 
 
 def scale_transform(obj: bpy.types.Object) -> NDArray[np.float64]:
@@ -209,7 +238,7 @@ def stored_mesh(obj: bpy.types.Object) -> Iterator[bpy.types.Mesh]:
 
 
 def _arrays_of(obj: bpy.types.Object, mesh: bpy.types.Mesh, transform: NDArray[np.float64], keys: ShapeKeys | None,
-               owner: bpy.types.Object | None, lost: str = "") -> MeshArrays:
+               owner: bpy.types.Object | None, lost: list[str], selected: NDArray[np.bool_] | None) -> MeshArrays:
     """Read a mesh that an object shows; with its owner, the object or as it is evaluated, all that it carries."""
     corners, polygon = _triangulated(mesh)
     corner_vertex = _read_or(mesh, ".corner_vert", len(mesh.loops), np.int32)
@@ -235,9 +264,9 @@ def _arrays_of(obj: bpy.types.Object, mesh: bpy.types.Mesh, transform: NDArray[n
         smooth=~sharp[polygon],
         transform=transform,
         materials=tuple(material and material.original for material in mesh.materials),
-        left_behind=names_left_behind(mesh, lost),
+        left_behind=(*unknown_attributes(mesh), *lost),
         template=obj.data,
-        selected=_read_or(mesh, ".select_poly", len(mesh.polygons), np.bool_)[polygon],
+        selected=None if selected is None else selected[polygon],
         **(_carried_of(obj, mesh, keys, owner) if owner is not None else {}),
     )
 
@@ -251,15 +280,9 @@ def _carried_of(obj: bpy.types.Object, mesh: bpy.types.Mesh, keys: ShapeKeys | N
         mesh.corner_normals.foreach_get("vector", normals)
         normals = normals.reshape(-1, 3)
     custom = mesh.attributes.get("custom_normal")
-    active = {
-        "uv": mesh.uv_layers.active.name if mesh.uv_layers.active else "",
-        "uv_render": next((layer.name for layer in mesh.uv_layers if layer.active_render), ""),
-        "color": mesh.attributes.active_color_name or "",
-        "color_render": mesh.attributes.default_color_name or "",
-    }
     return {
         "layers": read_layers(mesh),
-        "active": active,
+        "active": read_active(mesh),
         "normals": normals,
         "free_normals": custom is not None and custom.data_type == "FLOAT_VECTOR",
         "groups": read_groups(obj, mesh, owner),

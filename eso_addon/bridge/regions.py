@@ -38,7 +38,7 @@ def group_options(source: MeshArrays, name: str, *, use: str, factor: float, inv
 
 def outside_selection(source: MeshArrays) -> np.ndarray | None:
     """Tell the vertices, (n,) bool, of faces that are not selected; None if all faces are, or none is."""
-    if source.selected.all() or not source.selected.any():
+    if source.selected is None:
         return None
     outside = np.zeros(len(source.vertices), bool)
     outside[source.triangles[~source.selected]] = True
@@ -47,7 +47,7 @@ def outside_selection(source: MeshArrays) -> np.ndarray | None:
 
 def target_for_selection(source: MeshArrays, target: dict[str, Any]) -> dict[str, Any]:
     """Turn a ratio of the selected triangles into a count of all."""
-    if "ratio" not in target:
+    if source.selected is None or "ratio" not in target:
         return target
     if not 0 < target["ratio"] <= 1:
         return target  # the engine says what is wrong with it

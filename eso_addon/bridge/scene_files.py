@@ -87,6 +87,7 @@ class SceneFile:
         self.copies = [len(source.objects) for source in self.sources]
         self.parts = [(s.objects[0].name, s.arrays.vertices, s.arrays.triangles) for s in self.sources]
         losses = [(s.objects[0].name, ", ".join(s.arrays.left_behind)) for s in self.sources if s.arrays.left_behind]
+        losses += [(path.name, missing) for missing in missing_libraries()]
         self.left_behind = [f"{name}: not carried over: {names}" for name, names in losses]
 
     def write_simplified(self, path: Path, results: Sequence[Simplified]) -> list[Path]:
@@ -300,7 +301,24 @@ def _operator(name: str) -> Callable[..., set[str]]:
 
 def _read_blend(path: Path) -> None:
     bpy.ops.wm.open_mainfile(filepath=str(path), load_ui=False, use_scripts=False)
+    _make_local()
     _make_instances_real()
+
+
+def _make_local() -> None:
+    """Put data of the file's own in the place of what it links from others, and of library overrides."""
+    if len(bpy.data.libraries):
+        active = bpy.context.view_layer.objects.active
+        if active is not None and active.mode != "OBJECT":  # as the file was saved; there it is not allowed
+            bpy.ops.object.mode_set(mode="OBJECT")
+        bpy.ops.object.make_local(type="ALL")
+
+
+def missing_libraries() -> list[str]:
+    """Name what the open file links from files that are not there."""
+    names = [bpy.path.basename(library.filepath) for library in bpy.data.libraries
+             if getattr(library, "is_missing", False)]
+    return [f"what is linked from files that are not there ({', '.join(names)})"] if names else []
 
 
 def _make_instances_real() -> None:

@@ -1,13 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Shape keys as displacements from the first of them, and back, with their settings, drivers and animation."""
 
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
+from typing import Any
 
 import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-_SETTINGS = ("slider_min", "slider_max", "mute", "lock_shape", "vertex_group", "interpolation", "value")
+# In this order: a value is held within its limits, and each limit by the other, so that they are set twice.
+_SETTINGS = ("slider_min", "slider_max", "value", "mute", "lock_shape", "vertex_group", "interpolation")
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,33 +24,31 @@ class ShapeKeys:
         The first of them, in object space.
     offsets : ndarray, (keys, n, 3) float32
         From the neutral shape.
-    names : tuple of str
-    frames : tuple of float
-        Of absolute keys.
-    relative_to : tuple of int
-    settings : tuple of dict
-    use_relative : bool
-    eval_time : float
+    entries : list of dict
+        As `key_entries` gives them.
+    timing : dict
+        As `timing_of` gives it.
     source : bpy.types.Key
         For its drivers and animation.
     """
 
     neutral: NDArray[np.float32]
     offsets: NDArray[np.float32]
-    names: tuple[str, ...]
-    frames: tuple[float, ...]
-    relative_to: tuple[int, ...]
-    settings: tuple[dict[str, object], ...]
-    use_relative: bool
-    eval_time: float
+    entries: list[dict[str, Any]]
+    timing: dict[str, Any]
     source: bpy.types.Key
+
+    @property
+    def names(self) -> list[str]:
+        """What they are called."""
+        return [entry["name"] for entry in self.entries]
 
 
 def read_keys(mesh: bpy.types.Mesh) -> ShapeKeys | None:
     """Read the shape keys of a stored mesh; None if it has none."""
     if mesh.shape_keys is None or not len(mesh.shape_keys.key_blocks):
         return None
-    return _keys_of(mesh.shape_keys, np.stack([_points(block) for block in mesh.shape_keys.key_blocks]))
+    return _keys_of(mesh.shape_keys, np.stack([points_of(block) for block in mesh.shape_keys.key_blocks]))
 
 
 def with_shapes(keys: ShapeKeys, shapes: NDArray[np.float32]) -> ShapeKeys:
@@ -55,21 +57,23 @@ def with_shapes(keys: ShapeKeys, shapes: NDArray[np.float32]) -> ShapeKeys:
 
 
 def _keys_of(key: bpy.types.Key, shapes: NDArray[np.float32]) -> ShapeKeys:
+    return ShapeKeys(shapes[0], shapes - shapes[:1], key_entries(key), timing_of(key), key)
+
+
+def key_entries(key: bpy.types.Key) -> list[dict[str, Any]]:
+    """Give what is set of each key, as plain data: name, number of the key it is relative to, frame, and so on."""
     blocks = list(key.key_blocks)
-    return ShapeKeys(
-        neutral=shapes[0],
-        offsets=shapes - shapes[:1],
-        names=tuple(block.name for block in blocks),
-        frames=tuple(block.frame for block in blocks),
-        relative_to=tuple(blocks.index(block.relative_key) for block in blocks),
-        settings=tuple({name: getattr(block, name) for name in _SETTINGS} for block in blocks),
-        use_relative=key.use_relative,
-        eval_time=key.eval_time,
-        source=key,
-    )
+    return [{"name": block.name, "relative": blocks.index(block.relative_key), "frame": block.frame,
+             **{name: getattr(block, name) for name in _SETTINGS}} for block in blocks]
 
 
-def _points(block: bpy.types.ShapeKey) -> NDArray[np.float32]:
+def timing_of(key: bpy.types.Key) -> dict[str, Any]:
+    """Give what is set of all keys together: whether they are relative, and the time of absolute ones."""
+    return {"use_relative": key.use_relative, "eval_time": key.eval_time}
+
+
+def points_of(block: bpy.types.ShapeKey) -> NDArray[np.float32]:
+    """Give a key's positions, (n, 3)."""
     points = np.zeros(len(block.points) * 3, np.float32)
     block.points.foreach_get("co", points)
     return points.reshape(-1, 3)
@@ -88,20 +92,46 @@ def write_keys(obj: bpy.types.Object, keys: ShapeKeys, offsets: NDArray[np.float
     """
     positions = np.zeros(len(obj.data.vertices) * 3, np.float32)
     obj.data.vertices.foreach_get("co", positions)
-    for number, name in enumerate(keys.names):
+    add_keys(obj, list(positions.reshape(-1, 3) + offsets), keys.entries, keys.timing)
+    _copy_animation(keys.source, obj.data.shape_keys)
+
+
+def add_keys(obj: bpy.types.Object, shapes: Sequence[NDArray[np.float32]], entries: Sequence[Mapping[str, Any]],
+             timing: Mapping[str, Any]) -> None:
+    """Add shape keys to an object whose mesh has none.
+
+    Parameters
+    ----------
+    obj : bpy.types.Object
+    shapes : sequence of ndarray, (n, 3) float32
+        Positions.
+    entries, timing
+        As `key_entries` and `timing_of` give them; of a file, whatever Blender takes is used.
+    """
+    if not len(shapes):
+        return
+    for number, (shape, entry) in enumerate(zip(shapes, entries, strict=True)):
         if number:  # absolute keys stand at the time at which they are added
-            obj.data.shape_keys.eval_time = keys.frames[number]
-        block = obj.shape_key_add(name=name, from_mix=False)
+            _set(obj.data.shape_keys, "eval_time", entry.get("frame", 0.0))
+        block = obj.shape_key_add(name=str(entry.get("name", "")), from_mix=False)
         if number == 0:
-            obj.data.shape_keys.use_relative = keys.use_relative
-        block.points.foreach_set("co", positions + offsets[number].ravel())
+            _set(obj.data.shape_keys, "use_relative", timing.get("use_relative", True))
+        block.points.foreach_set("co", np.ascontiguousarray(shape, np.float32).ravel())
     written = obj.data.shape_keys
-    for block, relative, settings in zip(written.key_blocks, keys.relative_to, keys.settings, strict=True):
-        block.relative_key = written.key_blocks[relative]
-        for name, value in settings.items():
-            setattr(block, name, value)
-    written.eval_time = keys.eval_time
-    _copy_animation(keys.source, written)
+    for block, entry in zip(written.key_blocks, entries, strict=True):
+        relative = entry.get("relative")
+        if type(relative) is int and 0 <= relative < len(shapes):
+            block.relative_key = written.key_blocks[relative]
+        for name in (*_SETTINGS[:2], *_SETTINGS):
+            if name in entry:
+                _set(block, name, entry[name])
+    _set(written, "eval_time", timing.get("eval_time", 0.0))
+
+
+def _set(thing: bpy.types.bpy_struct, name: str, value: object) -> None:
+    """Set what another Blender, or another program, has told; what this one does not take stays as it is."""
+    with suppress(TypeError, ValueError, OverflowError, AttributeError):
+        setattr(thing, name, value)
 
 
 def _copy_animation(source: bpy.types.Key, target: bpy.types.Key) -> None:

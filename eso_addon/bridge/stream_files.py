@@ -11,7 +11,7 @@ from ..files.off import FileFormatError
 from ..progressive.progressive import Level
 from ..progressive.scene import Scene
 from .quiet import quiet
-from .scene_files import READERS, start_empty, visible_meshes, write_scene
+from .scene_files import READERS, missing_libraries, start_empty, visible_meshes, write_scene
 from .stream_mesh import StreamMesh
 from .stream_objects import add_objects, read_objects
 
@@ -32,7 +32,9 @@ def read_stream_objects(path: Path, *, keep_order: bool) -> tuple[list[StreamMes
         READERS[path.suffix.lower()](path)
         objects = visible_meshes()
         if objects:
-            return read_objects(objects, keep_order=keep_order)
+            meshes, meta = read_objects(objects, keep_order=keep_order)
+            meshes[0].left_behind += missing_libraries()
+            return meshes, meta
     raise FileFormatError(f"{path.name} has no visible mesh: nothing to work on")
 
 

@@ -21,8 +21,11 @@ from ..progressive.polygons import (
     mark_polygons,
 )
 from ..progressive.progressive import Level
+from .active_layers import read_active, write_active
 from .attributes import ATTRIBUTE_TYPES, read_attribute, write_attribute
 from .layers import read_layers
+from .shape_keys import add_keys, key_entries, points_of, timing_of
+from .vertex_groups import fill_group, read_weights
 
 Attributes = dict[str, dict[str, NDArray]]
 _DOMAINS = {"POINT": "vertex", "CORNER": "corner", "FACE": "face", "EDGE": "side"}
@@ -33,7 +36,6 @@ _SAME = 1e-3
 _BUILT_IN = {"material_index": ("INT", "FACE"), "sharp_face": ("BOOLEAN", "FACE"), "sharp_edge": ("BOOLEAN", "EDGE"),
              "uv_seam": ("BOOLEAN", "EDGE"), "crease_edge": ("FLOAT", "EDGE"), "crease_vert": ("FLOAT", "POINT"),
              "custom_normal": ("", "")}
-_KEY_SETTINGS = ("value", "slider_min", "slider_max", "mute", "vertex_group")
 
 
 @dataclass
@@ -79,7 +81,7 @@ def read_stream_mesh(mesh: bpy.types.Mesh, obj: bpy.types.Object, *, keep_order:
     _read_layers(result, mesh, corners, polygon, np.where(inside, -1, corner_edge.take(corners)), loose)
     _read_normals(result, mesh, corners)
     _read_groups(result, mesh, obj)
-    _read_active(result, mesh)
+    result.meta.update(read_active(mesh))
     return result
 
 
@@ -138,45 +140,29 @@ def _read_normals(result: StreamMesh, mesh: bpy.types.Mesh, corners: NDArray) ->
 
 def _read_groups(result: StreamMesh, mesh: bpy.types.Mesh, obj: bpy.types.Object) -> None:
     """Read vertex groups: weights, -1 where a vertex is not in a group."""
-    names = [group.name for group in obj.vertex_groups]
-    if not names:
+    groups = obj.vertex_groups
+    if not len(groups):
         return
-    weights = np.full((len(mesh.vertices), len(names)), -1, np.float32)
-    rows = [(vertex.index, element.group, element.weight) for vertex in mesh.vertices for element in vertex.groups
-            if element.group < len(names)]
-    if rows:
-        vertex, group, weight = zip(*rows, strict=True)
-        weights[list(vertex), list(group)] = weight
-    result.meta["groups"] = names
+    weights = read_weights(mesh, len(groups), absent=-1)
+    result.meta["groups"] = [group.name for group in groups]
+    result.meta["groups_locked"] = [group.lock_weight for group in groups]
     named = result.attributes.setdefault("vertex", {})
-    for number in range(len(names)):
+    for number in range(len(groups)):
         named[f"{GROUP}{number}"] = np.ascontiguousarray(weights[:, number])
 
 
 def read_keys(result: StreamMesh, mesh: bpy.types.Mesh) -> None:
     """Read the shape keys of a stored mesh."""
-    if mesh.shape_keys is None:
+    keys = mesh.shape_keys
+    if keys is None:
         return
-    blocks = list(mesh.shape_keys.key_blocks)
-    keys = [{"name": block.name, "relative": blocks.index(block.relative_key),
-             **{name: getattr(block, name) for name in _KEY_SETTINGS}} for block in blocks]
-    result.meta["keys"] = keys
+    result.meta["keys"], result.meta["keys_timing"] = key_entries(keys), timing_of(keys)
     named = result.attributes.setdefault("vertex", {})
-    for number, block in enumerate(blocks):
-        points = np.zeros(3 * len(block.points), np.float32)
-        block.points.foreach_get("co", points)
-        named[f"{KEY}{number}"] = points.reshape(-1, 3)
-
-
-def _read_active(result: StreamMesh, mesh: bpy.types.Mesh) -> None:
-    if mesh.uv_layers.active is not None:
-        result.meta["uv"] = mesh.uv_layers.active.name
-    shown = [layer.name for layer in mesh.uv_layers if layer.active_render]
-    result.meta.update({"uv_render": shown[0]} if shown else {})
-    attributes = mesh.attributes
-    for key, name in (("color", attributes.active_color_name), ("color_render", attributes.default_color_name)):
-        if name:
-            result.meta[key] = name
+    for number, block in enumerate(keys.key_blocks):
+        named[f"{KEY}{number}"] = points_of(block)
+    animation = keys.animation_data
+    if animation is not None and (animation.action is not None or len(animation.drivers) or len(animation.nla_tracks)):
+        result.left_behind.append("animation and drivers of shape keys")
 
 
 def write_stream_mesh(level: Level, meta: dict[str, Any], name: str) -> bpy.types.Mesh:
@@ -209,7 +195,7 @@ def write_stream_mesh(level: Level, meta: dict[str, Any], name: str) -> bpy.type
     mesh.update(calc_edges=True)
     _write_layers(mesh, level, meta, slots, starts)
     _write_normals(mesh, level, meta, slots)
-    _write_active(mesh, meta)
+    write_active(mesh, meta)
     if len(faces) and _damaged(faces):
         mesh.validate()
     return mesh
@@ -304,52 +290,25 @@ def _write_normals(mesh: bpy.types.Mesh, level: Level, meta: dict[str, Any], slo
     mesh.normals_split_custom_set(values)
 
 
-def _write_active(mesh: bpy.types.Mesh, meta: dict[str, Any]) -> None:
-    uv, shown = (mesh.uv_layers.get(str(meta.get(key, ""))) for key in ("uv", "uv_render"))
-    if uv is not None:
-        mesh.uv_layers.active = uv
-    if shown is not None:
-        shown.active_render = True
-    color, rendered = (str(meta.get(key, "")) for key in ("color", "color_render"))
-    if color in mesh.attributes:
-        mesh.attributes.active_color_name = color
-    if rendered in mesh.attributes:
-        mesh.attributes.default_color_name = rendered
-
-
 def write_owned(obj: bpy.types.Object, level: Level, meta: dict[str, Any]) -> None:
     """Write vertex groups and shape keys to an object whose mesh has just been made."""
     named = level.attributes.get("vertex", {})
-    groups = meta.get("groups")
-    groups = groups if isinstance(groups, list) else []
+    groups, locked = (_list(meta.get(key)) for key in ("groups", "groups_locked"))
     obj.vertex_groups.clear()
     for number, name in enumerate(groups):
         group = obj.vertex_groups.new(name=str(name))
+        group.lock_weight = locked[number:number + 1] == [True]
         weights = named.get(f"{GROUP}{number}")
-        if weights is None or weights.ndim != 1:
-            continue
-        members = np.flatnonzero(weights >= 0)
-        values, inverse = np.unique(weights[members], return_inverse=True)
-        order = np.argsort(inverse.ravel(), kind="stable")
-        ends = np.searchsorted(inverse.ravel()[order], np.arange(1, len(values)))
-        for chosen, weight in zip(np.split(members[order], ends), values.tolist(), strict=False):
-            group.add(chosen.tolist(), weight, "REPLACE")
-    _write_keys(obj, named, meta.get("keys"))
+        if weights is not None and weights.ndim == 1:
+            fill_group(group, weights, np.flatnonzero(weights >= 0))
+    keys = _list(meta.get("keys"))
+    shapes = [named.get(f"{KEY}{number}") for number in range(len(keys))]
+    if all(isinstance(key, dict) for key in keys):
+        there = [shape for shape in shapes if shape is not None and shape.shape[1:] == (3,)]
+        timing = meta.get("keys_timing")
+        if len(there) == len(keys):
+            add_keys(obj, there, keys, timing if isinstance(timing, dict) else {})
 
 
-def _write_keys(obj: bpy.types.Object, named: dict[str, NDArray], keys: Any) -> None:  # noqa: ANN401 - from a file
-    shapes = [(key, named.get(f"{KEY}{number}")) for number, key in enumerate(keys if isinstance(keys, list) else [])]
-    made = []
-    for key, points in shapes:
-        if not isinstance(key, dict) or points is None or points.shape[1:] != (3,):
-            return
-        block = obj.shape_key_add(name=str(key.get("name", "")), from_mix=False)
-        block.points.foreach_set("co", points.astype(np.float32).ravel())
-        made.append(block)
-    for (key, _), block in zip(shapes, made, strict=True):
-        relative = key.get("relative")
-        if isinstance(relative, int) and 0 <= relative < len(made):
-            block.relative_key = made[relative]
-        for name in _KEY_SETTINGS:
-            if isinstance(key.get(name), (bool, int, float, str)):
-                setattr(block, name, key[name])
+def _list(value: Any) -> list:  # noqa: ANN401 - from a file
+    return value if isinstance(value, list) else []

@@ -16,6 +16,7 @@ from ..core.mesh import MeshError
 from ..core.steps import scaled
 from ..progressive.progressive import Level, progressive_steps
 from ..progressive.scene import Scene, load_scene
+from .left_behind import lost_with_modifiers
 from .nodes import use_nodes
 from .read_mesh import evaluated_mesh, stored_mesh
 from .stream_mesh import StreamMesh, read_keys, read_stream_mesh, write_owned, write_stream_mesh
@@ -59,6 +60,7 @@ def read_objects(objects: Sequence[bpy.types.Object], *, apply_modifiers: bool =
         if key not in known:
             known[key] = len(meshes)
             meshes.append(_read(obj, changed=changed, keep_order=keep_order))
+            meshes[-1].left_behind += lost_with_modifiers(obj, applied=apply_modifiers, stay=False)
             meshes[-1].meta["materials"] = _numbers(obj.data.materials, materials)
         entry = {"name": obj.name, "mesh": known[key], "matrix": np.array(obj.matrix_world).ravel().tolist()}
         if any(slot.link == "OBJECT" for slot in obj.material_slots):
@@ -224,7 +226,8 @@ def loaded_scene(path: Path, *, partial: bool = False) -> Scene:
     """Read a stream, or give the last one again if its file has not changed."""
     stat = path.stat()
     stamp = stat.st_mtime, stat.st_size
-    if path not in _loaded or _loaded[path][0] != stamp:
+    known = _loaded.get(path)
+    if known is None or known[0] != stamp or (known[1].damage and not partial):
         scene = load_scene(path, partial=partial)
         _loaded.clear()  # one is enough for a slider
         _loaded[path] = stamp, scene

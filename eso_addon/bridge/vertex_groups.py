@@ -47,12 +47,7 @@ def read_groups(obj: bpy.types.Object, mesh: bpy.types.Mesh, owner: bpy.types.Ob
     groups = owner.vertex_groups
     if not len(groups):
         return None
-    rows = [(vertex.index, element.group, element.weight) for vertex in mesh.vertices for element in vertex.groups]
-    weights = np.zeros((len(mesh.vertices), len(groups)), np.float32)
-    if rows:
-        vertex, group, weight = zip(*rows, strict=True)
-        known = np.array(group) < len(groups)
-        weights[np.array(vertex)[known], np.array(group)[known]] = np.array(weight, np.float32)[known]
+    weights = read_weights(mesh, len(groups), absent=0)
     weights = np.nan_to_num(weights, nan=0.0, posinf=1.0, neginf=0.0).clip(0, 1)
     bones = _deforming_bones(obj)
     return VertexGroups(
@@ -62,6 +57,17 @@ def read_groups(obj: bpy.types.Object, mesh: bpy.types.Mesh, owner: bpy.types.Ob
         locked=tuple(group.lock_weight for group in groups),
         active=max(groups.find(obj.vertex_groups.active.name), 0) if obj.vertex_groups.active else 0,
     )
+
+
+def read_weights(mesh: bpy.types.Mesh, count: int, *, absent: float) -> NDArray[np.float32]:
+    """Read the weights of a mesh in so many groups, (n, count); `absent` where a vertex is not in one."""
+    weights = np.full((len(mesh.vertices), count), absent, np.float32)
+    rows = [(vertex.index, element.group, element.weight) for vertex in mesh.vertices for element in vertex.groups
+            if element.group < count]
+    if rows:
+        vertex, group, weight = zip(*rows, strict=True)
+        weights[list(vertex), list(group)] = weight
+    return weights
 
 
 def _deforming_bones(obj: bpy.types.Object) -> set[str]:
@@ -104,10 +110,14 @@ def write_groups(obj: bpy.types.Object, groups: VertexGroups, weights: NDArray[n
     for number, name in enumerate(groups.names):
         group = obj.vertex_groups.new(name=name)
         group.lock_weight = groups.locked[number]
-        vertices = np.flatnonzero(weights[:, number] > 0)
-        values, inverse = np.unique(weights[vertices, number], return_inverse=True)
-        order = np.argsort(inverse.ravel(), kind="stable")
-        starts = np.searchsorted(inverse.ravel()[order], np.arange(len(values)))
-        for members, weight in zip(np.split(vertices[order], starts[1:]), values.tolist(), strict=False):
-            group.add(members.tolist(), weight, "REPLACE")
+        fill_group(group, weights[:, number], np.flatnonzero(weights[:, number] > 0))
     obj.vertex_groups.active_index = groups.active
+
+
+def fill_group(group: bpy.types.VertexGroup, weights: NDArray[np.float32], members: NDArray[np.int64]) -> None:
+    """Put vertices in a group, with their weights of all, (n,); Blender takes vertices of one weight at a time."""
+    values, inverse = np.unique(weights[members], return_inverse=True)
+    order = np.argsort(inverse.ravel(), kind="stable")
+    ends = np.searchsorted(inverse.ravel()[order], np.arange(1, len(values)))
+    for chosen, weight in zip(np.split(members[order], ends), values.tolist(), strict=False):
+        group.add(chosen.tolist(), weight, "REPLACE")

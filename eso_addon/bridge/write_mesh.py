@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.mesh import MeshError
+from .active_layers import write_active
 from .attributes import read_attribute, write_attribute
 from .layers import Layer, write_layer
 from .polygons import Polygons, polygons_again, triangles_alone
@@ -195,21 +196,7 @@ def _write_layers(mesh: bpy.types.Mesh, result: Simplified, source: MeshArrays, 
         else:
             values = _at_edges(mesh, layer, carried[layer.name], result.edges, loose)  # type: ignore[attr-defined]
         write_layer(mesh, layer, values)
-    _set_active(mesh, source.active or {})
-
-
-def _set_active(mesh: bpy.types.Mesh, active: dict[str, str]) -> None:
-    """Make the layers active and rendered that are so in the source."""
-    uv, shown = (mesh.uv_layers.get(active.get(which, "")) for which in ("uv", "uv_render"))
-    if uv is not None:
-        mesh.uv_layers.active = uv
-    if shown is not None:
-        shown.active_render = True
-    color, rendered = (active.get(which, "") for which in ("color", "color_render"))
-    if color in mesh.attributes:
-        mesh.attributes.active_color_name = color
-    if rendered in mesh.attributes:
-        mesh.attributes.default_color_name = rendered
+    write_active(mesh, source.active or {})
 
 
 def _at_edges(mesh: bpy.types.Mesh, layer: Layer, values: NDArray, edges: NDArray[np.int32],

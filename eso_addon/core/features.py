@@ -210,7 +210,7 @@ def _rows(values: ArrayLike, shape: tuple[int, ...], kind: str) -> np.ndarray:
     array = np.asarray(values)
     if array.shape[: len(shape)] != shape:
         raise MeshError(f"a {kind} attribute has shape {array.shape}: it must begin with {shape}")
-    rows = array.reshape(int(np.prod(shape)), -1)
+    rows = array.reshape(int(np.prod(shape)), int(np.prod(array.shape[len(shape) :])))
     if rows.dtype.kind == "f":
         rows = np.where(np.isnan(rows), np.inf, rows)  # equal to itself
     return rows

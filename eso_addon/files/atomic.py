@@ -4,7 +4,7 @@
 import os
 import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -54,16 +54,33 @@ def atomic_output(target: str | os.PathLike[str]) -> Iterator[Path]:
         shutil.rmtree(folder, ignore_errors=True)
 
 
-def check_place(*targets: str | os.PathLike[str] | None) -> None:
-    """Refuse a file in a folder that does not exist, or with the name of a folder: before the work, not after it.
+def check_place(path: str | os.PathLike[str] | None, *, unlike: Iterable[str | os.PathLike[str]] = ()) -> None:
+    """Refuse a file that cannot be written: before the work, not after it.
+
+    Parameters
+    ----------
+    path
+        The file; None is none, and fine.
+    unlike
+        Files that the same run reads or writes, which are not to be written over.
 
     Raises
     ------
     OSError
-        What is wrong with the first of them that cannot be written.
+        Its folder does not exist, it has the name of a folder, or is one of the others.
     """
-    for target in (Path(target).absolute() for target in targets if target is not None):
-        if not target.parent.is_dir():
-            raise FileNotFoundError(f"cannot write {target.name}: the folder {target.parent} does not exist")
-        if target.is_dir():
-            raise IsADirectoryError(f"cannot write {target}: it is a folder; give the name of a file")
+    if path is None:
+        return
+    target = Path(path).absolute()
+    if not target.parent.is_dir():
+        raise FileNotFoundError(f"cannot write {target.name}: the folder {target.parent} does not exist")
+    if target.is_dir():
+        raise IsADirectoryError(f"cannot write {target}: it is a folder; give the name of a file")
+    if any(_is_same(target, Path(other)) for other in unlike):
+        raise FileExistsError(f"cannot write {target.name}: another file of this run has that name; give another")
+
+
+def _is_same(one: Path, other: Path) -> bool:
+    if one.exists() and other.exists():  # a file system may not tell capitals from small letters
+        return one.samefile(other)
+    return one.resolve() == other.resolve()

@@ -8,13 +8,14 @@ import bpy
 
 from ..core.errors import MeshError
 from ..core.steps import run_to_end
+from .refusal import refuse
 from .worker import GRACE_SECONDS, Steps, Worker
 
 _POLL_SECONDS = 0.01
 # Each picture of the bar costs a redraw, which window and engine wait for.
 _SHOW_SECONDS = 1.0
 # What the user may go on doing while the engine works; anything else could change the source under it.
-_VIEW_EVENTS = {"MIDDLEMOUSE", "WHEELUPMOUSE", "WHEELDOWNMOUSE", "MOUSEMOVE", "TRACKPADPAN", "TRACKPADZOOM"}
+VIEW_EVENTS = {"MIDDLEMOUSE", "WHEELUPMOUSE", "WHEELDOWNMOUSE", "MOUSEMOVE", "TRACKPADPAN", "TRACKPADZOOM"}
 
 
 class EngineOperator:
@@ -45,7 +46,7 @@ class EngineOperator:
         try:
             return self._finished(context, run_to_end(self.prepare(context)))
         except (MeshError, MemoryError) as error:
-            return self._refused(error)
+            return refuse(self, error)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event | None) -> set[str]:
         """Start the engine in a thread, if there is a window to keep alive."""
@@ -55,7 +56,7 @@ class EngineOperator:
         try:
             self._worker = Worker(self.prepare(context))
         except (MeshError, MemoryError) as error:
-            return self._refused(error)
+            return refuse(self, error)
         manager = context.window_manager
         self._timer = manager.event_timer_add(_POLL_SECONDS, window=context.window)
         manager.modal_handler_add(self)
@@ -70,7 +71,7 @@ class EngineOperator:
         if self._worker.is_running and not self._is_given_up():
             if event.type == "TIMER" and time.perf_counter() - self._show_time >= _SHOW_SECONDS:
                 self._show_progress(context)
-            return {"PASS_THROUGH"} if event.type in _VIEW_EVENTS else {"RUNNING_MODAL"}
+            return {"PASS_THROUGH"} if event.type in VIEW_EVENTS else {"RUNNING_MODAL"}
         self._clean_up(context)
         if self._worker.is_stopped:
             self.report({"INFO"}, "Cancelled: nothing was changed")  # type: ignore[attr-defined]
@@ -78,9 +79,9 @@ class EngineOperator:
         try:
             return self._finished(context, self._worker.result())
         except (MeshError, MemoryError) as error:
-            return self._refused(error)
+            return refuse(self, error)
         except ReferenceError:
-            return self._refused(MeshError("the object was removed meanwhile: nothing was changed"))
+            return refuse(self, MeshError("the object was removed meanwhile: nothing was changed"))
 
     def cancel(self, context: bpy.types.Context) -> None:
         """Join the thread when Blender takes the operator away: a file is loaded, the window closed."""
@@ -94,11 +95,6 @@ class EngineOperator:
     def _finished(self, context: bpy.types.Context, result: Any) -> set[str]:  # noqa: ANN401
         self.finish(context, result)
         return {"FINISHED"}
-
-    def _refused(self, error: MeshError | MemoryError) -> set[str]:
-        text = str(error) if isinstance(error, MeshError) else "not enough memory for this mesh: simplify it in parts"
-        self.report({"ERROR"}, text[:1].upper() + text[1:])  # type: ignore[attr-defined]
-        return {"CANCELLED"}
 
     def _show_progress(self, context: bpy.types.Context) -> None:
         self._show_time = time.perf_counter()

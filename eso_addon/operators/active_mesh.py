@@ -8,6 +8,7 @@ from typing import Any
 import bpy
 from bpy.props import BoolProperty
 
+from ..core.errors import MeshError
 from ..jobs.modal import EngineOperator
 from .polls import poll_with, why_not_simplify
 
@@ -28,8 +29,16 @@ class ActiveMeshOperator(EngineOperator):
         return poll_with(cls, why_not_simplify(context))
 
     def read(self, context: bpy.types.Context) -> None:
-        """Read the active mesh."""
+        """Read the active mesh.
+
+        Raises
+        ------
+        MeshError
+            It has no faces, or cannot be read.
+        """
         from ..bridge.read_mesh import read_mesh
 
         self._object = context.active_object
         self._source = read_mesh(self._object, apply_modifiers=self.apply_modifiers)
+        if not len(self._source.triangles):
+            raise MeshError(f"'{self._object.name}' has no faces: there is nothing to show")

@@ -79,8 +79,9 @@ def _distances(original: "MeshArrays", simplified: "MeshArrays") -> "Generator[f
     yield 0.0
     if not len(original.triangles):
         raise MeshError("the original has no faces: there is no surface to compare with")
-    count = max(len(simplified.triangles), 1)
-    sides = int(np.clip(np.sqrt(2 * _POINTS / count) - 1, 1, 24))
+    if not len(simplified.triangles):
+        raise MeshError("the active mesh has no faces: there is nothing to show")
+    sides = int(np.clip(np.sqrt(2 * _POINTS / len(simplified.triangles)) - 1, 1, 24))
     points, faces = divided(simplified.vertices, simplified.triangles, sides)
     search = ClosestPoints(original.vertices, original.triangles)
     yield 0.3

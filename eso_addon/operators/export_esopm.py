@@ -12,6 +12,8 @@ from bpy_extras.io_utils import ExportHelper
 
 from ..core.errors import MeshError
 from ..core.steps import run_to_end, scaled
+from ..files.atomic import check_place
+from ..jobs.refusal import refuse
 from ..progressive.errors import StreamError
 from .polls import poll_with
 from .reports import tell
@@ -73,29 +75,32 @@ class EXPORT_MESH_OT_esopm(bpy.types.Operator, ExportHelper):
         from ..viewer.page import write_page
 
         started = time.perf_counter()
+        path = Path(bpy.path.abspath(self.filepath))
         chosen = mesh_objects(context, selected=self.use_selection)
         manager = context.window_manager
         manager.progress_begin(0, 1)
         try:
+            check_place(path)
+            if self.web_page:
+                check_place(path.with_suffix(".html"), unlike=[path])
             meshes, meta = read_objects(chosen, apply_modifiers=self.apply_modifiers, keep_order=self.keep_order)
             steps = stream_steps(meshes, meta, {"method": self.method, "ratio": self.base_percent / 100})
             scene = run_to_end(scaled(steps, manager.progress_update))
-            size = scene.save(self.filepath, bits=self.bits if self.quantise else None, keep_order=self.keep_order)
+            size = scene.save(path, bits=self.bits if self.quantise else None, keep_order=self.keep_order)
             if self.web_page:
-                write_page(self.filepath, Path(self.filepath).with_suffix(".html"))
+                write_page(path, path.with_suffix(".html"))
         except (MeshError, StreamError, OSError) as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
+            return refuse(self, error)
         finally:
             manager.progress_end()
         vertices = sum(mesh.vertex_count for mesh in scene.meshes)
-        base = base_bytes(Path(self.filepath).read_bytes())
+        base = base_bytes(path.read_bytes())
         lost = sorted({name for mesh in meshes for name in mesh.left_behind})
         figures = [f"{scene.face_count:,} triangles", f"base {base:,} bytes",
                    f"whole {size:,} bytes ({size / max(vertices, 1):.1f} a vertex)",
                    f"{time.perf_counter() - started:.2f} s"]
         notes = [f"Not carried: {', '.join(lost)}"] if lost else []
-        tell(self, context, f"Exported {Path(self.filepath).name}", figures, notes)
+        tell(self, context, f"Exported {path.name}", figures, notes)
         return {"FINISHED"}
 
 

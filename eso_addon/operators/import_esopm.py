@@ -12,6 +12,7 @@ from bpy_extras.io_utils import ImportHelper
 
 from ..bridge.objects import select_only
 from ..core.errors import MeshError
+from ..jobs.refusal import refuse
 from ..progressive.errors import StreamError
 from .reports import tell
 from .stream_level import remember
@@ -63,8 +64,7 @@ class IMPORT_MESH_OT_esopm(bpy.types.Operator, ImportHelper):
             levels = scene.levels(faces=faces)
             objects = add_objects(scene, levels, context.collection)
         except (MeshError, StreamError, OSError) as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
+            return refuse(self, error)
         remember(objects, path, scene, levels)
         select_only(objects, context.view_layer)
         count = sum(len(level.faces) for level in levels)

@@ -6,13 +6,12 @@ from typing import Any
 
 import bpy
 
+from ..jobs.modal import VIEW_EVENTS
 from ..settings.scene import on_level
 from . import shown
 from .polls import poll_with, why_not_simplify
 from .simplify import SimplifyReading
 
-# What stays the user's own while the slider is out, beside what is over the sidebar.
-_VIEW_EVENTS = {"MIDDLEMOUSE", "WHEELUPMOUSE", "WHEELDOWNMOUSE", "MOUSEMOVE", "TRACKPADPAN", "TRACKPADZOOM"}
 _POLL_SECONDS = 0.1
 _REST_SECONDS = 0.25
 
@@ -76,7 +75,7 @@ class OBJECT_OT_eso_level_slide(SimplifyReading, bpy.types.Operator):
         # The slider keeps the mouse's release to itself, so that a rest stands for it.
         if event.type == "TIMER" and self._dragged and time.perf_counter() - self._moved > _REST_SECONDS:
             self._write(context)
-        return {"PASS_THROUGH"} if event.type in _VIEW_EVENTS or _over_sidebar(context, event) else {"RUNNING_MODAL"}
+        return {"PASS_THROUGH"} if event.type in VIEW_EVENTS or _over_sidebar(context, event) else {"RUNNING_MODAL"}
 
     def cancel(self, context: bpy.types.Context) -> None:
         """Leave everything as it was when Blender takes the operator away."""

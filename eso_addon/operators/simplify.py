@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import bpy
 
 from ..bridge import objects
-from ..bridge.modifiers import live_modifiers, switched_off
+from ..bridge.modifiers import live_modifiers
 from ..core.errors import MeshError
 from ..jobs.modal import EngineOperator
 from ..jobs.replay import replayed_steps
@@ -36,8 +36,8 @@ class SimplifyReading(EngineOperator, SimplifyOptions):
         if reason:
             raise MeshError(reason)
         self._live = live_modifiers(self._object, {"ARMATURE"}) if self.apply_modifiers else []
-        with switched_off(self._object, self._live):
-            self._source = read_mesh(self._object, apply_modifiers=self.apply_modifiers, carry=True)
+        self._source = read_mesh(self._object, apply_modifiers=self.apply_modifiers, live=self._live, carry=True,
+                                 selection=self.only_selected and self._object.mode == "EDIT")
         targets, regions = self._asked()
         arrays = self._source.vertices, self._source.triangles
         options = {**self.engine_options(), **self._source.carried, **regions}
@@ -55,7 +55,7 @@ class SimplifyReading(EngineOperator, SimplifyOptions):
         if self.vertex_group:
             regions = group_options(source, self.vertex_group, use=self.group_use, factor=self.group_factor,
                                     invert=self.invert_group)
-        outside = outside_selection(source) if self.only_selected and self._object.mode == "EDIT" else None
+        outside = outside_selection(source)
         if outside is not None:
             regions["locked"] = outside | regions.get("locked", False)
             target = target_for_selection(source, target)

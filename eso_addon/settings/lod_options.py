@@ -10,6 +10,7 @@ from bpy.props import BoolProperty, EnumProperty, StringProperty
 
 from ..core.errors import MeshError
 from .keep_options import KeepOptions
+from .level_text import TEXT_OF, read_levels
 from .options import EngineOptions
 from .profiles import PROFILES
 from .screen_options import ScreenOptions
@@ -28,8 +29,6 @@ _LEVELS_BY = (
     ("screen", "Screen", "Sizes on screen, in pixels, at which nobody sees a difference"),
     ("budget", "Budget", "Triangles of all meshes together, spent where they matter most"),
 )
-_LIST_OF = {"ratio": "ratios", "count": "faces_targets", "error": "max_errors", "screen": "screen_sizes",
-            "budget": "budgets"}
 _PROFILES = tuple((name, profile.label, f"Names and layout for {profile.label}") for name, profile in PROFILES.items())
 
 
@@ -86,7 +85,7 @@ class LodOptions(EngineOptions, KeepOptions, ScreenOptions):
         """Draw the levels' kind, their list unless it is drawn as rows, and where they go."""
         layout.prop(self, "levels_by")
         if as_text:
-            layout.prop(self, _LIST_OF[self.levels_by])
+            layout.prop(self, TEXT_OF[self.levels_by])
         if self.levels_by == "screen":
             self.draw_screen(layout)
         layout.prop(self, "profile")
@@ -115,8 +114,8 @@ class LodOptions(EngineOptions, KeepOptions, ScreenOptions):
         """
         from .lod_record import ordered_goals
 
-        text, kind = getattr(self, _LIST_OF[self.levels_by]), self.levels_by
-        goals = ordered_goals(kind, _numbers(text, whole=kind in ("count", "budget")))
+        kind = self.levels_by
+        goals = ordered_goals(kind, read_levels(kind, getattr(self, TEXT_OF[kind])))
         reason = PROFILES[self.profile].why_not(len(goals))
         if reason:
             raise MeshError(reason)
@@ -139,16 +138,3 @@ class LodOptions(EngineOptions, KeepOptions, ScreenOptions):
             group=self.group_settings(),
             writing=self.writing(),
         )
-
-
-def _numbers(text: str, *, whole: bool = False) -> list[float]:
-    """Read numbers separated by commas."""
-    words = text.replace(";", ",").replace(",", " ").split()
-    example = "8000, 2000, 500" if whole else "0.5, 0.25, 0.1"
-    try:
-        numbers = [float(int(word)) if whole else float(word) for word in words]
-    except (ValueError, OverflowError):
-        numbers = []
-    if not numbers:
-        raise MeshError(f"levels '{text}' cannot be read: write numbers with commas between, such as {example}")
-    return numbers

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from mathutils import Matrix
 
-from eso_addon.bridge.read_mesh import read_mesh, scale_transform
+from eso_addon.bridge.read_mesh import GROUPS, KEYS, NORMALS, read_mesh, scale_transform
 from eso_addon.core.mesh import MeshError
 from tests.bridge.blender_scenes import add_cube, add_mesh, add_sphere, arrays, linked_from_library
 
@@ -206,7 +206,7 @@ def test_nothing_is_left_behind() -> None:
     mesh.normals_split_custom_set([(0, 0, 1)] * 24)
     read = read_mesh(obj, apply_modifiers=False, carry=True)
     assert read.left_behind == ()
-    assert {"UVMap", "Paint", "Wear", "sharp_edge", "custom normals", "vertex groups", "shape keys"} <= set(
+    assert {"UVMap", "Paint", "Wear", "sharp_edge", NORMALS, GROUPS, KEYS} <= set(
         read.carried["attributes"])
 
 
@@ -232,3 +232,20 @@ def test_shape_keys_go_through_modifiers() -> None:
     assert read.keys.offsets.shape == (2, len(read.vertices), 3)
     assert np.count_nonzero(read.keys.offsets[1]) == 2
     assert not obj.show_only_shape_key
+
+
+@pytest.mark.parametrize("applied", [True, False])
+def test_a_key_is_read_whole_whatever_mutes_it(applied: bool) -> None:
+    obj = add_cube()
+    obj.vertex_groups.new(name="Half").add(range(8), 0.5, "REPLACE")
+    obj.shape_key_add(name="Basis")
+    for name in ("Muted", "Grouped", "Plain"):
+        obj.shape_key_add(name=name, from_mix=False).points[0].co.z += 1
+    keys = obj.data.shape_keys.key_blocks
+    keys["Muted"].mute, keys["Grouped"].vertex_group = True, "Half"
+    if applied:
+        obj.modifiers.new("Cut", "TRIANGULATE")
+    read = read_mesh(obj, carry=True)
+    assert read.keys is not None
+    assert np.abs(read.keys.offsets).max(axis=(1, 2)) == pytest.approx([0, 1, 1, 1])
+    assert [(key.mute, key.vertex_group) for key in keys] == [(False, ""), (True, ""), (False, "Half"), (False, "")]

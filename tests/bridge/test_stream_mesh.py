@@ -45,3 +45,21 @@ def test_meshes_that_blender_would_not_make(kind: str) -> None:
         assert len(obj.data.vertices) == len(level[0].vertices)
         if kind not in ("repeated", "fins"):  # which Blender drops
             assert len(obj.data.polygons) == len(level[0].faces)
+
+
+@pytest.mark.parametrize("entry", [
+    {"name": 3, "relative": "x", "frame": float("nan"), "slider_min": "low", "value": None, "mute": "yes",
+     "vertex_group": 7, "interpolation": "KEY_MAGIC"},
+    {"name": "Far", "relative": 99, "frame": -1e300, "slider_max": 1e300, "value": [1], "interpolation": 0}, {}, 5])
+def test_odd_shape_keys_do_no_harm(entry: object) -> None:
+    points, faces = grid(5, 5, np.random.default_rng(0), closed=False)
+    named = {"vertex": {f".key.{number}": (points + number).astype(np.float32) for number in range(2)}}
+    meta = {"keys": [entry, {"name": "Up"}], "keys_timing": {"eval_time": "noon", "use_relative": []},
+            "groups": ["A", 3], "groups_locked": ["x", True, False]}
+    scene = Scene([progressive(points, faces, attributes=named, base_faces=4, meta=meta)], {})
+    obj = add_objects(scene, scene.levels(), bpy.context.scene.collection)[0]
+    assert [group.lock_weight for group in obj.vertex_groups] == [False, True]
+    assert (obj.data.shape_keys is None) == (entry == 5)
+    if entry != 5:
+        assert [len(key.points) for key in obj.data.shape_keys.key_blocks] == [25, 25]
+        assert obj.data.shape_keys.key_blocks[1].name == "Up"

@@ -83,6 +83,13 @@ def test_sharp_edges_are_those_of_the_three_rules(seed: int) -> None:
     assert_array_equal(found, np.unique(np.sort(found, axis=1), axis=0).reshape(-1, 2))
 
 
+def test_a_mesh_without_faces_has_no_such_edges() -> None:
+    faces, points = np.zeros((0, 3), np.int64), np.zeros((2, 3))
+    found = sharp_edges(points, faces, face_values=[np.zeros(0), np.zeros((0, 2))],
+                        corner_values=[np.zeros((0, 3)), np.zeros((0, 3, 2))], angle=40)
+    assert found.shape == base_edges(points, faces, 0.5).shape == (0, 2)
+
+
 def test_marks_and_an_angle_make_sharp_edges() -> None:
     vertices, faces = shapes.tube(3, 4)
     vertices = vertices * [1, 1, 2.0]

@@ -1,13 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a finished character or prop carries is there after object.eso_simplify, and the source is untouched."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import bpy
 import numpy as np
 import pytest
-from mathutils import Matrix
+from mathutils import Matrix, Vector
 
+from eso_addon.bridge.selection import MARK
 from tests.bridge.blender_scenes import activate, add_sphere, linked_from_library
 
 pytestmark = pytest.mark.usefixtures("addon")
@@ -160,6 +162,20 @@ def test_simulations_and_armatures_stay_live_while_others_are_applied() -> None:
     assert all(modifier.show_viewport for modifier in obj.modifiers)
 
 
+@pytest.mark.parametrize("in_place", [True, False])
+@pytest.mark.parametrize("kind", ["PARTICLE_SYSTEM", "FLUID", "COLLISION", "DYNAMIC_PAINT"])
+def test_simulations_go_on(kind: str, in_place: bool) -> None:
+    obj = add_sphere()
+    modifier = obj.modifiers.new("Simulated", kind)
+    if kind == "FLUID":
+        modifier.fluid_type = "FLOW"
+    simplify_active(ratio=0.5, in_place=in_place)
+    new = bpy.context.object
+    assert [modifier.type for modifier in new.modifiers] == [kind]
+    assert len(new.particle_systems) == (kind == "PARTICLE_SYSTEM")
+    assert len(new.data.polygons) == 640
+
+
 def test_polygons_that_have_not_changed_stay_what_they_were() -> None:
     bpy.ops.mesh.primitive_uv_sphere_add()
     obj = bpy.context.object
@@ -179,20 +195,68 @@ def outlines(obj: bpy.types.Object) -> set[tuple]:
     return {tuple(tuple(obj.data.vertices[v].co) for v in polygon.vertices) for polygon in obj.data.polygons}
 
 
-def test_only_the_selection_in_edit_mode() -> None:
+@pytest.mark.parametrize("kind", ["", "TRIANGULATE", "WELD", "EDGE_SPLIT"])
+def test_only_the_selection_in_edit_mode(kind: str) -> None:
     bpy.ops.mesh.primitive_uv_sphere_add()
     obj = bpy.context.object
-    bpy.ops.object.mode_set(mode="EDIT")
-    bpy.ops.mesh.select_all(action="DESELECT")
-    bpy.ops.object.mode_set(mode="OBJECT")
-    for polygon in obj.data.polygons:
-        polygon.select = polygon.center.z > 0
+    if kind:
+        obj.modifiers.new("Some", kind)
+    select_faces(obj, lambda center: center.z > 0)
     before = {tuple(v.co) for v in obj.data.vertices if v.co.z < -0.05}
-    bpy.ops.object.mode_set(mode="EDIT")
     simplify_active(ratio=0.5)
     after = {tuple(v.co) for v in bpy.context.object.data.vertices if v.co.z < -0.05}
     assert before == after
     assert bpy.context.object["eso_triangles"] == pytest.approx(480 + 240, abs=2)
+    assert not any(MARK in made.data.attributes for made in (obj, bpy.context.object))
+
+
+def select_faces(obj: bpy.types.Object, chosen: Callable[[Vector], bool]) -> None:
+    """Select faces by their centres and switch to Edit Mode."""
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.mesh.select_all(action="DESELECT")
+    bpy.ops.object.mode_set(mode="OBJECT")
+    for polygon in obj.data.polygons:
+        polygon.select = chosen(polygon.center)
+    bpy.ops.object.mode_set(mode="EDIT")
+
+
+@pytest.mark.parametrize("action", ["SELECT", "DESELECT"])
+@pytest.mark.parametrize("kind", ["TRIANGULATE", "REMESH"])
+def test_all_or_no_faces_selected_means_the_whole_mesh(kind: str, action: str) -> None:
+    bpy.ops.mesh.primitive_uv_sphere_add()
+    bpy.context.object.modifiers.new("Some", kind)
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.mesh.select_all(action=action)
+    simplify_active(ratio=0.5)
+    assert bpy.context.object["eso_ratio"] == pytest.approx(0.5, abs=0.01)
+
+
+@pytest.mark.parametrize(("kind", "message"), [("REMESH", "apply them first"), ("MASK", "leave nothing")])
+def test_a_selection_that_modifiers_lose_is_refused(kind: str, message: str) -> None:
+    bpy.ops.mesh.primitive_uv_sphere_add()
+    obj = bpy.context.object
+    below = obj.vertex_groups.new(name="Below")
+    below.add([vertex.index for vertex in obj.data.vertices if vertex.co.z < 0.1], 1.0, "REPLACE")
+    modifier = obj.modifiers.new("Some", kind)
+    if kind == "MASK":
+        modifier.vertex_group = "Below"
+    select_faces(obj, lambda center: center.z > 0.5)
+    with pytest.raises(RuntimeError, match=message):
+        simplify_active(ratio=0.5)
+    assert obj.mode == "EDIT"
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert MARK not in obj.data.attributes
+    assert all(polygon.select == (polygon.center.z > 0.5) for polygon in obj.data.polygons)
+
+
+@pytest.mark.parametrize("name", ["vertex groups", "shape keys", "custom normals"])
+def test_an_attribute_may_have_any_name(name: str) -> None:
+    obj = character()
+    obj.data.attributes.new(name, "INT", "POINT").data.foreach_set("value", np.arange(len(obj.data.vertices)))
+    assert simplify_active(ratio=1.0) == {"FINISHED"}
+    new = bpy.context.object.data
+    assert sorted(item.value for item in new.attributes[name].data) == list(range(len(new.vertices)))
+    assert len(new.shape_keys.key_blocks) == len(bpy.context.object.vertex_groups) == 2
 
 
 @pytest.mark.parametrize("keep", [True, False])

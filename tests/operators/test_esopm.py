@@ -129,6 +129,49 @@ def test_everything_comes_back_in_its_order(tmp_path: Path) -> None:
     assert [(key.name, key.value, key.slider_max) for key in keys.key_blocks][1] == ("Up", 0.25, 2.0)
 
 
+def everything_set(keys: bpy.types.Key) -> list:
+    """Give all that is set of shape keys."""
+    return [keys.use_relative, keys.eval_time, *((
+        key.name, key.frame, key.relative_key.name, key.interpolation, key.lock_shape, key.mute, key.slider_min,
+        key.slider_max, key.value, key.vertex_group, [tuple(point.co) for point in key.points])
+        for key in keys.key_blocks)]
+
+
+@pytest.mark.parametrize("relative", [True, False])
+def test_shape_keys_and_locks_come_back_as_they_are_set(relative: bool, tmp_path: Path) -> None:
+    obj = add_cube()
+    obj.vertex_groups.new(name="Open").add([1], 0.25, "REPLACE")
+    obj.vertex_groups.new(name="Locked").lock_weight = True
+    obj.shape_key_add(name="Basis")
+    keys = obj.data.shape_keys
+    keys.use_relative = relative
+    for number in (1, 2, 3):
+        keys.eval_time = 30.0 * number
+        obj.shape_key_add(name=f"Key {number}", from_mix=False).points[number].co.z += number
+    first, second, third = keys.key_blocks[1:]
+    first.interpolation, first.lock_shape, first.vertex_group = "KEY_CARDINAL", True, "Open"
+    second.mute, second.relative_key = True, first
+    for key, least, most, value in ((second, -5.0, -2.0, -3.0), (third, 5.0, 9.0, 6.5)):
+        key.slider_min, key.slider_max = -10.0, most
+        key.slider_min, key.value = least, value
+    keys.eval_time = 12.5
+    path = exported(tmp_path / "keys.esopm", keep_order=True)
+    new = imported(path)[0]
+    assert everything_set(new.data.shape_keys) == everything_set(keys)
+    assert [group.lock_weight for group in new.vertex_groups] == [False, True]
+    new.eso_stream.percent = 1
+    new.eso_stream.percent = 100
+    assert everything_set(new.data.shape_keys) == everything_set(keys)
+
+
+def test_animation_of_shape_keys_is_told(tmp_path: Path) -> None:
+    obj = add_cube()
+    obj.shape_key_add(name="Basis")
+    obj.shape_key_add(name="Up").driver_add("value").driver.expression = "0.25"
+    exported(tmp_path / "keys.esopm")
+    assert "Not carried: animation and drivers of shape keys" in bpy.context.window_manager.eso_last_run.lines
+
+
 def test_without_order_the_same_polygons(tmp_path: Path) -> None:
     obj = loose_cylinder()
     path = exported(tmp_path / "a.esopm")
@@ -212,6 +255,36 @@ def test_bad_input_is_one_error(tmp_path: Path) -> None:
     with pytest.raises(RuntimeError, match="cannot|No such|denied|Is a dir|not a dir|exist"):
         bpy.ops.export_mesh.esopm(filepath=str(tmp_path / "p.esopm" / "x.esopm"))
     assert (tmp_path / "p.esopm").read_bytes() == whole
+
+
+def test_a_damaged_file_is_refused_after_it_was_read_in_part(tmp_path: Path) -> None:
+    add_sphere(subdivisions=5)
+    path = exported(tmp_path / "ball.esopm")
+    whole = path.read_bytes()
+    path.write_bytes(whole[:len(whole) // 2])
+    for _ in range(2):
+        with pytest.raises(RuntimeError, match="cut short"):
+            bpy.ops.import_mesh.esopm(filepath=str(path))
+        assert imported(path, partial=True)
+
+
+@pytest.mark.filterwarnings("ignore:.*does not support blend relative")
+def test_a_path_beside_the_blend_file(tmp_path: Path) -> None:
+    add_cube()
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "scene.blend"))
+    assert bpy.ops.export_mesh.esopm(filepath="//cube.esopm", web_page=True) == {"FINISHED"}
+    assert {"cube.esopm", "cube.html", "scene.blend"} == {path.name for path in tmp_path.iterdir()}
+    assert bpy.ops.import_mesh.esopm(filepath="//cube.esopm") == {"FINISHED"}
+
+
+def test_the_page_is_not_written_over_the_stream(tmp_path: Path) -> None:
+    add_cube()
+    with pytest.raises(RuntimeError, match="give another"):
+        bpy.ops.export_mesh.esopm(filepath=str(tmp_path / "cube.html"), web_page=True)
+    for path in ("", str(tmp_path)):
+        with pytest.raises(RuntimeError, match="Cannot write"):
+            bpy.ops.export_mesh.esopm(filepath=path, web_page=True)
+    assert not list(tmp_path.iterdir())
 
 
 def test_nothing_selected_is_told(tmp_path: Path) -> None:

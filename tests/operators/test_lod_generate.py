@@ -63,14 +63,14 @@ def test_running_again_replaces_the_levels_or_keeps_them() -> None:
     assert len(bpy.data.objects) == 4
 
 
-@pytest.mark.parametrize("text", ["", "half", "0.5, ,x", "0.5 0.25 -"])
+@pytest.mark.parametrize("text", ["", "half", "0.5, ,x", "0.5 0.25 -", "nan", "0.5, inf"])
 def test_a_list_that_cannot_be_read_is_refused(text: str) -> None:
     add_sphere()
     with pytest.raises(RuntimeError, match="write numbers with commas between"):
         generate(ratios=text)
 
 
-@pytest.mark.parametrize("text", ["0.5, 0", "1.5", "-0.1", "nan"])
+@pytest.mark.parametrize("text", ["0.5, 0", "1.5", "-0.1"])
 def test_ratios_out_of_range_are_refused(text: str) -> None:
     add_sphere()
     with pytest.raises(RuntimeError, match="[Rr]atio"):

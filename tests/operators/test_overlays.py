@@ -11,7 +11,7 @@ from eso_addon import vertex_weights
 from eso_addon.operators import shown
 from eso_addon.operators.colors import ramp
 from eso_addon.operators.deviation_show import divided
-from tests.bridge.blender_scenes import add_cube, add_sphere, addon, arrays, empty_file
+from tests.bridge.blender_scenes import activate, add_cube, add_mesh, add_sphere, addon, arrays, empty_file
 
 __all__ = ["addon", "empty_file"]
 
@@ -45,6 +45,20 @@ def test_a_copy_deviates_by_nothing_and_a_level_by_something() -> None:
     assert float(overlay.high) > 0
     assert len(overlay.colors) == len(overlay.vertices)
     assert overlay.faces.max() < len(overlay.vertices)
+
+
+@pytest.mark.parametrize("name", ["eso_weights_show", "eso_edges_show", "eso_deviation_show"])
+@pytest.mark.parametrize("in_edit_mode", [True, False])
+def test_a_mesh_without_faces_is_refused(name: str, in_edit_mode: bool) -> None:
+    other = add_cube()
+    obj = add_mesh("Points", [(0, 0, 0), (1, 0, 0)], [], [(0, 1)])
+    obj.modifiers.new("Cut", "TRIANGULATE")
+    activate(obj, other)
+    if in_edit_mode and name != "eso_deviation_show":
+        bpy.ops.object.mode_set(mode="EDIT")
+    with pytest.raises(RuntimeError, match="has no faces: there is nothing to show"):
+        getattr(bpy.ops.object, name)()
+    assert shown.shown() is None
 
 
 def test_it_can_be_hidden_and_goes_with_the_file() -> None:

@@ -9,6 +9,9 @@ import pytest
 
 from eso_addon import operators, settings, ui
 from eso_addon import settings as settings_package
+from eso_addon.core.errors import MeshError
+from eso_addon.settings.level_list import MOST
+from eso_addon.settings.level_text import TEXT_OF
 from eso_addon.ui import menus, panels
 from tests.bridge.blender_scenes import activate, add_cube, add_sphere, linked_from_library
 
@@ -139,6 +142,38 @@ def test_levels_are_rows_of_the_text_that_operators_take() -> None:
     bpy.ops.scene.eso_level_set(name="Unity")
     assert settings.profile == "unity"
     assert len(settings.level_values()) == 4
+
+
+@pytest.mark.parametrize(("kind", "text"), [
+    ("count", "inf"), ("screen", "inf, 3"), ("budget", "1e400"), ("ratio", "nan"), ("ratio", "0.5, x"), ("error", "")])
+def test_levels_that_cannot_be_read_are_shown_as_text(kind: str, text: str) -> None:
+    settings = bpy.context.scene.eso_lod
+    settings.levels_by = kind
+    setattr(settings, TEXT_OF[kind], text)
+    assert list(getattr(settings, f"row_{kind}")) == [0] * MOST
+    assert settings.level_values() == []
+    drawn = drawn_by(panels.VIEW3D_PT_eso_levels)
+    assert any(TEXT_OF[kind] in line for line in drawn)
+    with pytest.raises(MeshError, match="write numbers with commas between"):
+        settings.level_goals()
+    settings.add_level()
+    assert len(settings.level_values()) == 1
+
+
+def test_rows_hold_large_numbers_and_drop_no_levels() -> None:
+    settings = bpy.context.scene.eso_lod
+    settings.faces_targets = "5000000000, 100"
+    assert list(settings.row_count)[:2] == [2**31 - 1, 100]
+    settings.row_count[1] = 50
+    assert settings.faces_targets == "5000000000, 50"
+    settings.ratios = "0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1"
+    settings.row_ratio[0] = 0.95
+    assert settings.ratios == "0.95, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1"
+    bpy.ops.scene.eso_level_add()
+    assert len(settings.level_values()) == 9
+    rows = [name for kind, name, _ in drawn_by(panels.VIEW3D_PT_eso_levels) if (kind, name) == ("prop", "row_ratio")]
+    assert len(rows) == MOST
+    assert "+ 1" in labels(panels.VIEW3D_PT_eso_levels)
 
 
 def test_figures_stand_beside_the_levels_before_and_after() -> None:
