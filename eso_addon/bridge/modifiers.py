@@ -36,15 +36,26 @@ def live_modifiers(obj: bpy.types.Object, types: Collection[str]) -> list[str]:
 
 @contextmanager
 def switched_off(obj: bpy.types.Object, names: Collection[str]) -> Iterator[None]:
-    """Evaluate an object without some of its modifiers."""
+    """Evaluate an object without some of its modifiers, and as no parent bends it: that stays live too."""
     shown = [modifier for modifier in obj.modifiers if modifier.name in names and modifier.show_viewport]
+    bent = obj.parent is not None and obj.parent_type == "ARMATURE" and len(obj.modifiers) > 0
     try:
         for modifier in shown:
             modifier.show_viewport = False
+        if bent:
+            _set_parent_type(obj, "OBJECT")
         yield
     finally:
         for modifier in shown:
             modifier.show_viewport = True
+        if bent:
+            _set_parent_type(obj, "ARMATURE")
+
+
+def _set_parent_type(obj: bpy.types.Object, kind: str) -> None:
+    inverse = obj.matrix_parent_inverse.copy()  # which Blender clears
+    obj.parent_type = kind
+    obj.matrix_parent_inverse = inverse
 
 
 def keep_modifiers(obj: bpy.types.Object, names: Collection[str]) -> None:
