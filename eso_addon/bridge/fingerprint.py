@@ -89,19 +89,26 @@ def _add_layers(digest: blake2b, mesh: bpy.types.Mesh) -> None:
             digest.update(np.asarray(read_attribute(mesh, attribute.name)).tobytes())
 
 
-def modifier_settings(obj: bpy.types.Object) -> str:
-    """List the settings of an object's modifiers as text."""
-    return repr([settings_of_modifier(obj, modifier) for modifier in obj.modifiers])
+def modifier_settings(obj: bpy.types.Object, *, places: bool = True) -> str:
+    """List the settings of an object's modifiers as text, and where what they look at stands beside the object."""
+    beside = obj.matrix_world.inverted_safe() if places else None
+    return repr([(mod.type, _of_modifier(mod, None if mod.type == "ARMATURE" else beside)) for mod in obj.modifiers])
 
 
-def settings_of_modifier(obj: bpy.types.Object, modifier: bpy.types.Modifier) -> tuple[str, list[Any]]:
-    """List the settings of a modifier, and where what it looks at stands beside its object."""
-    beside = None if modifier.type == "ARMATURE" else obj.matrix_world.inverted_safe()
+def _of_modifier(modifier: bpy.types.Modifier, beside: Matrix | None) -> list[tuple[str, Any]]:
     found = _settings(modifier, beside, 0 if modifier.type in _SHALLOW else _DEEPEST)
-    if hasattr(modifier, "keys") and modifier.type == "NODES":
+    if modifier.type == "NODES":
         with suppress(TypeError):  # since Blender 5.2 inputs are settings like others
             found += [(key, _told(modifier[key], beside, _DEEPEST)) for key in modifier.keys()]  # noqa: SIM118
-    return modifier.type, found
+    return found
+
+
+def looks_outside(modifier: bpy.types.Modifier) -> bool:
+    """Tell whether what a modifier does may depend on more than its settings: on other objects, or on node groups."""
+    values = [getattr(modifier, prop.identifier) for prop in modifier.bl_rna.properties
+              if prop.type in {"POINTER", "COLLECTION"} and prop.identifier != "rna_type"]
+    return any(isinstance(value, bpy.types.ID) or (isinstance(value, bpy.types.bpy_prop_collection) and len(value))
+               for value in values)
 
 
 def _settings(thing: bpy.types.bpy_struct, beside: Matrix | None, depth: int) -> list[tuple[str, Any]]:

@@ -45,18 +45,18 @@ def meshes_behind(things: Iterable[bpy.types.Object]) -> list[bpy.types.Object]:
     instances, and for what that instances.
     """
     found: dict[bpy.types.Object, None] = {}
-    for obj in [*things]:
+    for obj in things:
         if is_instancer(obj):
-            inner = inside(obj)
-            found.update(dict.fromkeys(mesh for mesh in inner if _is_plain_mesh(mesh)))
+            found.update(dict.fromkeys(filter(None, map(_source_or_itself, inside(obj)))))
         elif obj.type == "MESH":
-            made = level_info.is_level(obj) or level_info.is_hull(obj)
-            found[(level_info.find_source(obj) if made else None) or obj] = None
+            found[_source_or_itself(obj) or obj] = None
     return list(found)
 
 
-def _is_plain_mesh(obj: bpy.types.Object) -> bool:
-    return obj.type == "MESH" and not level_info.is_level(obj) and not level_info.is_hull(obj)
+def _source_or_itself(obj: bpy.types.Object) -> bpy.types.Object | None:
+    if level_info.is_level(obj) or level_info.is_hull(obj):
+        return level_info.find_source(obj)
+    return obj if obj.type == "MESH" else None
 
 
 def read_sources(meshes: Iterable[bpy.types.Object], *, apply_modifiers: bool,
