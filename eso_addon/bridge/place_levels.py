@@ -10,6 +10,7 @@ from ..core.errors import MeshError
 from . import level_info, objects
 from .copies import follow, note_modifiers
 from .level_names import check_free, fitting_names, take_name
+from .objects import SOURCE
 
 
 @dataclass(frozen=True)
@@ -123,17 +124,20 @@ def place_levels(place: Place, levels: Sequence[LevelMesh], scene: bpy.types.Sce
 
 
 def put_mesh(obj: bpy.types.Object, mesh: bpy.types.Mesh) -> None:
-    """Put a new mesh in the place of a level's; all who use the old one get it, and materials changed there stay."""
-    old = obj.data
+    """Put a new mesh in the place of a level's; what shares the old one gets it too, but for levels of other sources,
+    which may show something else by now. Materials changed there stay.
+    """
+    old, source = obj.data, obj.get(SOURCE)
     if old == mesh:
         return
     _keep_changed_materials(old, mesh)
-    old.user_remap(mesh)
-    obj.data = mesh
+    for user in [user for user in bpy.data.objects if user.data == old]:
+        if not level_info.is_level(user) or user[SOURCE] == source:
+            user.data = mesh
     name = old.name
     if not old.users:
         bpy.data.meshes.remove(old)
-        mesh.name = name
+    mesh.name = name
 
 
 def remove_with_mesh(obj: bpy.types.Object) -> None:

@@ -9,7 +9,8 @@ import pytest
 
 from eso_addon import operators, settings, ui
 from eso_addon import settings as settings_package
-from eso_addon.ui import menus, panels
+from eso_addon.settings import level_list
+from eso_addon.ui import menus, panels, presets
 from tests.bridge.blender_scenes import activate, add_cube, add_sphere, linked_from_library
 
 
@@ -139,6 +140,43 @@ def test_levels_are_rows_of_the_text_that_operators_take() -> None:
     bpy.ops.scene.eso_level_set(name="Unity")
     assert settings.profile == "unity"
     assert len(settings.level_values()) == 4
+
+
+def test_rows_leave_what_they_do_not_show_as_it_is_written() -> None:
+    settings = bpy.context.scene.eso_lod
+    settings.ratios = ".9 .8 .7 .6 .5 .4 .3 0.2000001 .1"
+    settings.row_ratio[1] = 0.75
+    assert settings.ratios == ".9, 0.75, .7, .6, .5, .4, .3, 0.2000001, .1"
+    settings.faces_targets = "5000000000, 100"
+    settings.row_count[1] = 50
+    assert settings.faces_targets == "5000000000, 50"
+    settings.levels_by = "ratio"
+    bpy.ops.scene.eso_level_add()
+    assert len(settings.level_values()) == 9
+    rows = [name for kind, name, _ in drawn_by(panels.VIEW3D_PT_eso_levels) if (kind, name) == ("prop", "row_ratio")]
+    assert len(rows) == 8
+    assert "+ 1" in labels(panels.VIEW3D_PT_eso_levels)
+
+
+@pytest.mark.parametrize("text", ["inf", "nan, 100", "-inf", "1e400", "100, x"])
+@pytest.mark.parametrize("kind", ["ratio", "count", "error", "screen", "budget"])
+def test_rows_of_what_is_no_number_are_left_out(kind: str, text: str) -> None:
+    settings = bpy.context.scene.eso_lod
+    settings.levels_by = kind
+    setattr(settings, level_list._TEXT_OF[kind], text)
+    assert list(getattr(settings, f"row_{kind}"))[1:] == [0] * 7
+    assert drawn_by(panels.VIEW3D_PT_eso_levels)
+    add_sphere()
+    with pytest.raises(RuntimeError, match="(?i)cannot be read|write numbers|number"):
+        bpy.ops.object.eso_lod_generate(levels_by=kind, **{level_list._TEXT_OF[kind]: text})
+
+
+def test_a_preset_holds_the_whole_panel_but_for_what_is_of_one_file() -> None:
+    kept = {value.removeprefix("settings.") for value in presets.SCENE_OT_eso_preset_add.preset_values}
+    shown = {name for name in bpy.context.scene.eso_lod.bl_rna.properties.keys()  # noqa: SIM118 - no dictionary
+             if not name.startswith("row_")} - {"rna_type", "name"}
+    assert shown - kept == {"vertex_group", "scope", "source_collection", "collection"}
+    assert kept <= shown
 
 
 def test_figures_stand_beside_the_levels_before_and_after() -> None:
