@@ -88,11 +88,11 @@ def follow(obj: bpy.types.Object, source: bpy.types.Object, *, modifiers_applied
         obj.constraints.clear()
         for constraint in twin.constraints:
             obj.constraints.copy(constraint)
+        _take_modifiers(obj, twin, source)
         obj.animation_data_clear()
         if twin.animation_data is not None:
             with _from(twin, obj):
                 bpy.ops.object.make_links_data(type="ANIMATION")
-        _take_modifiers(obj, twin, source)
     finally:
         bpy.data.objects.remove(twin)
 
