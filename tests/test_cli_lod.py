@@ -277,3 +277,38 @@ def link(library: Path, kind: str) -> None:
             group = bpy.data.collections["Things"]
             group.override_hierarchy_create(scene, bpy.context.view_layer)
             scene.collection.children.unlink(group)
+
+
+@pytest.mark.parametrize("profile", ["unity", "secondlife"])
+def test_levels_in_a_blend_file_can_be_exported_from_there(village: Path, tmp_path: Path, profile: str) -> None:
+    from eso_addon import operators, settings
+
+    assert run("lod", village, tmp_path / "levels.blend", "--ratios", "0.5,0.2", "--profile", profile) == 0
+    names = set(read(tmp_path / "levels.blend"))
+    for part in (settings, operators):
+        part.register()
+    try:
+        bpy.ops.object.eso_lod_export(filepath=str(tmp_path / "again.glb"), which="ALL")
+    finally:
+        for part in (operators, settings):
+            part.unregister()
+    last = {"unity": "_LOD0", "secondlife": ""}[profile]
+    assert len(names) == 6
+    found = set(read(tmp_path / "again.glb"))
+    assert {name for name in found if name.startswith("S")} == {f"Säule.00{n}{suffix}" for n in (1, 2) for suffix in (
+        last, "_LOD1" if profile == "unity" else "_LOD2")}
+
+
+def test_a_hull_stands_where_its_source_stood(tmp_path: Path) -> None:
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    bpy.ops.mesh.primitive_ico_sphere_add(location=(5, 0, 0))
+    parent = bpy.context.object
+    bpy.ops.mesh.primitive_ico_sphere_add(location=(0, 3, 0))
+    bpy.context.object.parent = parent
+    bpy.context.object.name = "Child"
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "in.blend"), copy=True)
+    words = ("--ratios", "0.5", "--profile", "unreal", "--hulls", "one")
+    assert run("lod", tmp_path / "in.blend", tmp_path / "out.blend", *words) == 0
+    hull = read(tmp_path / "out.blend")["UCX_Child_LOD0_01"]
+    bpy.context.view_layer.update()
+    assert tuple(hull.matrix_world.translation) == pytest.approx((5, 3, 0))

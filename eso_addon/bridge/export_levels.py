@@ -35,19 +35,13 @@ class LevelGroup:
     hulls: Mapping[bpy.types.Object, str] = field(default_factory=dict)
 
 
-def groups_of(sources: Sequence[bpy.types.Object], name: Callable[[str, int], str],
+def groups_of(families: Sequence[level_info.Family], name: Callable[[str, int], str],
               hull_name: Callable[[str, int], str]) -> list[LevelGroup]:
-    """Gather what was made from each object, with the names that a profile gives."""
-    groups = []
-    for source in sources:
-        # Copies that the user made of a level come after it.
-        by_number = {level[level_info.LEVEL]: level for level in reversed(level_info.levels_of(source))}
-        levels = [by_number[number] for number in sorted(by_number)]
-        hulls = level_info.hulls_of(source)
-        groups.append(LevelGroup(
-            source.name, {level: name(source.name, number) for number, level in enumerate(levels)},
-            {hull: hull_name(source.name, number) for number, hull in enumerate(hulls, start=1)}))
-    return [group for group in groups if group.levels]
+    """Give what was made from each object the names that a profile gives."""
+    return [LevelGroup(
+        family.name, {level: name(family.name, number) for number, level in enumerate(family.levels)},
+        {hull: hull_name(family.name, number) for number, hull in enumerate(family.hulls, start=1)},
+    ) for family in families]
 
 
 def export_levels(path: Path, groups: Sequence[LevelGroup], layout: str, write: Callable[[Path], None]) -> None:

@@ -11,20 +11,21 @@ from numpy.typing import NDArray
 from ..core.adjacency import components
 from ..core.mesh import MeshError, weld
 from . import level_info
+from .copies import copied
 from .objects import SOURCE
 
 MOST_CORNERS = 64  # what every engine takes
 MOST_PARTS = 32
 
 
-def add_hulls(source: bpy.types.Object, finest: bpy.types.Object, base: str, name: Callable[[str, int], str],
+def add_hulls(stands: bpy.types.Object, finest: bpy.types.Object, base: str, name: Callable[[str, int], str],
               kind: str) -> list[bpy.types.Object]:
     """Add collision hulls where the levels are.
 
     Parameters
     ----------
-    source : bpy.types.Object
-        What they stand for.
+    stands : bpy.types.Object
+        Where they stand, and what moves them: the source, or a level.
     finest : bpy.types.Object
         What they are made around: the finest level.
     base : str
@@ -50,12 +51,10 @@ def add_hulls(source: bpy.types.Object, finest: bpy.types.Object, base: str, nam
     clouds = _clouds(finest.data, parts=kind == "parts" and name(base, 1) != name(base, 2))
     made = []
     for number, points in enumerate(clouds, start=1):
-        hull = bpy.data.objects.new(name(base, number), convex_hull(points, name(base, number)))
-        hull.parent, hull.parent_type, hull.parent_bone = source.parent, source.parent_type, source.parent_bone
-        hull.matrix_parent_inverse = source.matrix_parent_inverse
-        hull.matrix_basis = source.matrix_basis
+        hull = copied(stands, convex_hull(points, name(base, number)), modifiers_applied=True)
+        hull.name = name(base, number)
         hull.display_type = "WIRE"
-        hull[SOURCE], hull[level_info.MESH], hull[level_info.HULL] = base, source.data.name, number
+        hull[SOURCE], hull[level_info.MESH], hull[level_info.HULL] = base, finest.get(level_info.MESH, ""), number
         for collection in finest.users_collection:
             collection.objects.link(hull)
         made.append(hull)

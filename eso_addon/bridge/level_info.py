@@ -2,6 +2,7 @@
 """What a level knows about itself: custom properties, for the panel, for scripts, and to make it again."""
 
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import bpy
@@ -36,10 +37,55 @@ def levels_of(source: bpy.types.Object) -> list[bpy.types.Object]:
     return sorted(found, key=lambda obj: (obj[LEVEL], obj.name))
 
 
-def hulls_of(source: bpy.types.Object) -> list[bpy.types.Object]:
-    """List the collision hulls made from an object."""
-    found = [obj for obj in bpy.data.objects if is_hull(obj) and _is_made_from(obj, source)]
-    return sorted(found, key=lambda obj: (obj[HULL], obj.name))
+@dataclass(frozen=True)
+class Family:
+    """What was made from one object.
+
+    Attributes
+    ----------
+    name : str
+        The source's, or the one that it had, if it is gone.
+    source : bpy.types.Object or None
+    levels, hulls : list of bpy.types.Object
+        The finest first; each level once: copies that the user made of it do not count.
+    """
+
+    name: str
+    source: bpy.types.Object | None
+    levels: list[bpy.types.Object]
+    hulls: list[bpy.types.Object]
+
+
+def families(things: Iterable[bpy.types.Object] | None = None) -> list[Family]:
+    """Gather levels and hulls by what they were made from, whether that is still there or not.
+
+    Parameters
+    ----------
+    things : iterable of bpy.types.Object, optional
+        Sources, levels and hulls whose families are wanted, in this order; all that have levels by default.
+    """
+    levels: dict[bpy.types.Object | str, dict[int, bpy.types.Object]] = {}
+    hulls: dict[bpy.types.Object | str, dict[int, bpy.types.Object]] = {}
+    for obj in sorted(bpy.data.objects, key=lambda obj: obj.name):
+        if is_level(obj):
+            levels.setdefault(_origin(obj), {}).setdefault(obj[LEVEL], obj)
+        elif is_hull(obj):
+            hulls.setdefault(_origin(obj), {}).setdefault(obj[HULL], obj)
+    wanted = levels if things is None else dict.fromkeys(map(_origin, things))
+    return [Family(origin if isinstance(origin, str) else origin.name, None if isinstance(origin, str) else origin,
+                   _in_order(levels[origin]), _in_order(hulls.get(origin, {})))
+            for origin in wanted if origin in levels]
+
+
+def _in_order(numbered: Mapping[int, bpy.types.Object]) -> list[bpy.types.Object]:
+    return [numbered[number] for number in sorted(numbered)]
+
+
+def _origin(obj: bpy.types.Object) -> bpy.types.Object | str:
+    """Give what an object was made from, the name of that if it is gone, or the object itself if it is a source."""
+    if not is_level(obj) and not is_hull(obj):
+        return obj
+    return find_source(obj) or str(obj[SOURCE])
 
 
 def find_source(level: bpy.types.Object) -> bpy.types.Object | None:
@@ -52,7 +98,7 @@ def find_source(level: bpy.types.Object) -> bpy.types.Object | None:
         return None
     taken = {str(obj[SOURCE]) for obj in bpy.data.objects if SOURCE in obj}
     users = [obj for obj in bpy.data.objects
-             if obj.data == mesh and obj.name not in taken and _can_be_source(obj, level)]
+             if obj.data == mesh and LEVEL not in obj and obj.name not in taken and _can_be_source(obj, level)]
     return users[0] if len(users) == 1 else None
 
 
@@ -64,7 +110,9 @@ def _is_made_from(made: bpy.types.Object, source: bpy.types.Object) -> bool:
 
 
 def _can_be_source(obj: bpy.types.Object | None, level: bpy.types.Object) -> bool:
-    return obj is not None and obj.type == "MESH" and obj != level and LEVEL not in obj
+    """Tell whether an object may be what a level was made from; only one of another source may be a level itself."""
+    return (obj is not None and obj.type == "MESH" and obj != level
+            and not (LEVEL in obj and obj.get(SOURCE) == level.get(SOURCE)))
 
 
 def stale_ones(levels: Iterable[bpy.types.Object]) -> list[bpy.types.Object]:

@@ -11,7 +11,9 @@ import numpy as np
 from ..core.chains import Chain
 from ..core.mesh import MeshError
 from . import level_info
-from .fingerprint import fingerprint, modifier_settings
+from .alike import alike
+from .fingerprint import fingerprint
+from .instances import inside, is_instancer
 from .level_names import take_name
 from .modifiers import live_modifiers
 from .place_levels import LevelMesh, note_materials
@@ -40,26 +42,26 @@ class LodSource:
 
 def meshes_behind(things: Iterable[bpy.types.Object]) -> list[bpy.types.Object]:
     """List the mesh objects that stand behind objects, each once: a level stands for its source, an empty for what it
-    instances.
+    instances, and for what that instances.
     """
     found: dict[bpy.types.Object, None] = {}
     for obj in things:
-        if obj.type == "EMPTY" and obj.instance_collection is not None:
-            inner = obj.instance_collection.all_objects
-            found.update(dict.fromkeys(mesh for mesh in inner if _is_plain_mesh(mesh)))
+        if is_instancer(obj):
+            found.update(dict.fromkeys(filter(None, map(_source_or_itself, inside(obj)))))
         elif obj.type == "MESH":
-            made = level_info.is_level(obj) or level_info.is_hull(obj)
-            found[(level_info.find_source(obj) if made else None) or obj] = None
+            found[_source_or_itself(obj) or obj] = None
     return list(found)
 
 
-def _is_plain_mesh(obj: bpy.types.Object) -> bool:
-    return obj.type == "MESH" and not level_info.is_level(obj) and not level_info.is_hull(obj)
+def _source_or_itself(obj: bpy.types.Object) -> bpy.types.Object | None:
+    if level_info.is_level(obj) or level_info.is_hull(obj):
+        return level_info.find_source(obj)
+    return obj if obj.type == "MESH" else None
 
 
 def read_sources(meshes: Iterable[bpy.types.Object], *, apply_modifiers: bool,
                  live_types: Collection[str]) -> list[LodSource]:
-    """Read mesh objects, those that share a mesh and have the same modifiers together.
+    """Read mesh objects, those together that show the same mesh once their modifiers are applied.
 
     Parameters
     ----------
@@ -78,11 +80,8 @@ def read_sources(meshes: Iterable[bpy.types.Object], *, apply_modifiers: bool,
     MeshError
         A mesh that cannot be read.
     """
-    groups: dict[tuple[bpy.types.Mesh, str], list[bpy.types.Object]] = {}
-    for obj in meshes:
-        groups.setdefault((obj.data, modifier_settings(obj)), []).append(obj)
     sources = []
-    for group in groups.values():
+    for group in alike(meshes, apply_modifiers=apply_modifiers, live_types=live_types):
         group.sort(key=_volume, reverse=True)
         live = live_modifiers(group[0], live_types) if apply_modifiers else []
         arrays = read_mesh(group[0], apply_modifiers=apply_modifiers, live=live, carry=True)
@@ -98,18 +97,23 @@ def _volume(obj: bpy.types.Object) -> float:
 def engine_inputs(source: LodSource, group: Mapping[str, Any]) -> dict[str, Any]:
     """Give what the engine takes besides the user's options: what the mesh carries, and a vertex group's weights."""
     arrays = source.arrays
-    if not group or arrays.groups is None or group["vertex_group"] not in arrays.groups.names:
+    if not has_group(source, group):
         return arrays.carried
     chosen = group_options(arrays, group["vertex_group"], use=group["group_use"], factor=group["group_factor"],
                            invert=group["invert_group"])
     return {**arrays.carried, **chosen}
 
 
+def has_group(source: LodSource, group: Mapping[str, Any]) -> bool:
+    """Tell whether a mesh has the vertex group that is asked for."""
+    groups = source.arrays.groups
+    return groups is not None and group.get("vertex_group", "") in groups.names
+
+
 def check_group(sources: Sequence[LodSource], group: Mapping[str, Any]) -> None:
-    """Make sure that at least one of several meshes has the vertex group that is asked for."""
-    name = group.get("vertex_group", "")
-    if name and not any(source.arrays.groups and name in source.arrays.groups.names for source in sources):
-        raise MeshError(f"there is no vertex group '{name}': choose another, or none")
+    """Make sure that at least one of several meshes has the vertex group that is asked for, if any is."""
+    if group and not any(has_group(source, group) for source in sources):
+        raise MeshError(f"there is no vertex group '{group['vertex_group']}': choose another, or none")
 
 
 def write_chain(source: LodSource, chain: Chain, names: Sequence[str],

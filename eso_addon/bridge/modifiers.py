@@ -37,15 +37,32 @@ def live_modifiers(obj: bpy.types.Object, types: Collection[str]) -> list[str]:
 
 @contextmanager
 def switched_off(obj: bpy.types.Object, names: Collection[str]) -> Iterator[None]:
-    """Evaluate an object without some of its modifiers."""
+    """Evaluate an object without some of its modifiers, and as no parent bends it: that stays live too."""
     shown = [modifier for modifier in obj.modifiers if modifier.name in names and modifier.show_viewport]
+    how = obj.parent_type
+    bent = is_bent(obj) and len(obj.modifiers) > 0
     try:
         for modifier in shown:
             modifier.show_viewport = False
+        if bent:
+            _set_parent_type(obj, "OBJECT")
         yield
     finally:
         for modifier in shown:
             modifier.show_viewport = True
+        if bent:
+            _set_parent_type(obj, how)
+
+
+def is_bent(obj: bpy.types.Object) -> bool:
+    """Tell whether an object's parent moves its vertices, as a modifier would."""
+    return obj.parent is not None and obj.parent_type in {"ARMATURE", "LATTICE"}
+
+
+def _set_parent_type(obj: bpy.types.Object, kind: str) -> None:
+    inverse = obj.matrix_parent_inverse.copy()  # which Blender clears
+    obj.parent_type = kind
+    obj.matrix_parent_inverse = inverse
 
 
 def is_bound(modifier: bpy.types.Modifier) -> bool:

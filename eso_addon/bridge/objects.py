@@ -6,6 +6,7 @@ from collections.abc import Collection, Iterable, Mapping
 import bpy
 
 from ..core.errors import MeshError
+from .copies import copied
 from .modifiers import keep_modifiers
 
 # Custom properties of a result, for scripts and exporters.
@@ -42,7 +43,7 @@ def add_object(
     Parameters
     ----------
     source : bpy.types.Object
-        Left as it is; its parent, transform, animation and material slots are taken over.
+        Left as it is; see `copied` for what is taken over.
     mesh : bpy.types.Mesh
     name : str
     collections : iterable of bpy.types.Collection
@@ -58,14 +59,8 @@ def add_object(
     -------
     bpy.types.Object
     """
-    obj = source.copy()
-    if obj.override_library is not None:  # else a reload would give the library's mesh back
-        obj = obj.make_local(clear_liboverride=True)
+    obj = copied(source, mesh, modifiers_applied=modifiers_applied, live=live)
     obj.name = name
-    obj.data = mesh
-    if modifiers_applied:
-        keep_modifiers(obj, live)
-    obj.hide_viewport = obj.hide_select = False
     for key, value in properties.items():
         obj[key] = value
     for collection in collections:
@@ -120,7 +115,7 @@ def replace_mesh(
     modifiers_applied : bool
         The mesh has the modifiers in it already, so that they are removed.
     all_users : bool
-        The other objects that share the old mesh get the new one too.
+        The other objects that share the old mesh get the new one too; their modifiers are the same.
     live : collection of str
         Names of modifiers that are not in the mesh, and stay.
 
@@ -133,11 +128,12 @@ def replace_mesh(
     if reason:
         raise MeshError(reason)
     old = obj.data
+    users = [other for other in bpy.data.objects if other.data == old] if all_users else [obj]
     if all_users:
         old.user_remap(mesh)
     obj.data = mesh
-    if modifiers_applied:
-        keep_modifiers(obj, live)
+    for user in users if modifiers_applied else ():
+        keep_modifiers(user, live)
     if old.users == 0:
         name = old.name
         bpy.data.meshes.remove(old)

@@ -8,8 +8,9 @@ import bpy
 
 from ..core.errors import MeshError
 from . import level_info, objects
+from .copies import follow, note_modifiers
 from .level_names import check_free, fitting_names, take_name
-from .modifiers import keep_modifiers
+from .objects import SOURCE
 
 
 @dataclass(frozen=True)
@@ -110,9 +111,10 @@ def place_levels(place: Place, levels: Sequence[LevelMesh], scene: bpy.types.Sce
         if obj is None:
             obj = objects.add_object(place.source, level.mesh, place.names[number], [collection],
                                      modifiers_applied=modifiers_applied, live=live, properties={})
+            note_modifiers(obj)
         else:
             put_mesh(obj, level.mesh)
-            _renew(obj, place.source, modifiers_applied=modifiers_applied, live=live)
+            follow(obj, place.source, modifiers_applied=modifiers_applied, live=live)
             _move_to(obj, collection)
         for key, value in level.properties.items():
             obj[key] = value
@@ -122,17 +124,20 @@ def place_levels(place: Place, levels: Sequence[LevelMesh], scene: bpy.types.Sce
 
 
 def put_mesh(obj: bpy.types.Object, mesh: bpy.types.Mesh) -> None:
-    """Put a new mesh in the place of a level's; all who use the old one get it, and materials changed there stay."""
-    old = obj.data
+    """Put a new mesh in the place of a level's; what shares the old one gets it too, but for levels of other sources,
+    which may show something else by now. Materials changed there stay.
+    """
+    old, source = obj.data, obj.get(SOURCE)
     if old == mesh:
         return
     _keep_changed_materials(old, mesh)
-    old.user_remap(mesh)
-    obj.data = mesh
+    for user in [user for user in bpy.data.objects if user.data == old]:
+        if not level_info.is_level(user) or user[SOURCE] == source:
+            user.data = mesh
     name = old.name
     if not old.users:
         bpy.data.meshes.remove(old)
-        mesh.name = name
+    mesh.name = name
 
 
 def remove_with_mesh(obj: bpy.types.Object) -> None:
@@ -159,13 +164,6 @@ def _keep_changed_materials(old: bpy.types.Mesh, new: bpy.types.Mesh) -> None:
             if slot >= len(new.materials):
                 new.materials.append(material)
             new.materials[slot] = material
-
-
-def _renew(obj: bpy.types.Object, source: bpy.types.Object, *, modifiers_applied: bool, live: Sequence[str]) -> None:
-    """Have an earlier level drop the modifiers that are in its mesh now."""
-    if modifiers_applied:
-        ours = {modifier.name for modifier in source.modifiers} - set(live)
-        keep_modifiers(obj, [modifier.name for modifier in obj.modifiers if modifier.name not in ours])
 
 
 def _move_to(obj: bpy.types.Object, collection: bpy.types.Collection) -> None:

@@ -168,7 +168,7 @@ class SceneFile:
                 levels_of_one = self._add_objects(obj, levels, names[obj], bases[obj], source.live)
                 for level in levels_of_one:
                     level[level_info.SETTINGS], level[level_info.PROFILE] = settings, profile.key
-                added = add_hulls(obj, levels_of_one[0], bases[obj], profile.hull_name, hulls)
+                added = add_hulls(levels_of_one[0], levels_of_one[0], bases[obj], profile.hull_name, hulls)
                 made[obj] = LevelGroup(bases[obj], {level: level.name for level in levels_of_one},
                                        {hull: hull.name for hull in added})
             name_meshes(levels, names[source.objects[0]])

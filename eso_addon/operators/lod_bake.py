@@ -11,7 +11,7 @@ from bpy.props import EnumProperty, FloatProperty, IntProperty
 from ..bridge import level_info, objects
 from ..core.errors import MeshError
 from ..settings.profiles import PROFILES
-from .lod_polls import why_not_update
+from .lod_polls import chosen_objects, why_not_update
 from .polls import poll_with
 from .reports import tell
 
@@ -68,17 +68,19 @@ class OBJECT_OT_eso_lod_bake(bpy.types.Operator):
         from ..bridge.bake import why_not_bake
         from ..bridge.lod_sources import meshes_behind
 
-        chosen = meshes_behind(obj for obj in [context.active_object, *context.selected_objects] if obj is not None)
+        families = level_info.families(meshes_behind(chosen_objects(context)))
         pairs: dict[bpy.types.Mesh, tuple[bpy.types.Object, bpy.types.Object]] = {}
-        for source in chosen:
-            levels = level_info.levels_of(source)
-            for level in levels[self.detail == "finest" :]:
+        for family in families:
+            fine = family.levels[0] if self.detail == "finest" else family.source
+            if fine is None:
+                raise MeshError(f"'{family.name}', the source of these levels, is gone: bake from the finest level")
+            for level in family.levels[self.detail == "finest" :]:
                 profile = PROFILES.get(str(level.get(level_info.PROFILE, "")), PROFILES["plain"])
                 if not profile.normal_maps:
                     raise MeshError(f"{profile.label} takes no normal map of its own for each level")
                 if reason := why_not_bake(level):
                     raise MeshError(reason)
-                pairs.setdefault(level.data, (levels[0] if self.detail == "finest" else source, level))
+                pairs.setdefault(level.data, (fine, level))
         if not pairs:
             raise MeshError("none of the selected objects has coarser levels: generate some first")
         return list(pairs.values())

@@ -12,7 +12,7 @@ from bpy.props import BoolProperty, EnumProperty, StringProperty
 from ..bridge import level_info
 from ..core.errors import MeshError
 from ..settings.profiles import PROFILES
-from .lod_polls import why_not_update
+from .lod_polls import chosen_objects, why_not_update
 from .polls import poll_with
 from .reports import tell
 
@@ -101,30 +101,29 @@ class OBJECT_OT_eso_lod_export(bpy.types.Operator):
         """Gather what is to be written, and the profile's key."""
         from ..bridge.export_levels import groups_of
 
-        sources = self._sources(context)
-        keys = {str(level.get(level_info.PROFILE, "")) for obj in sources for level in level_info.levels_of(obj)}
+        families = self._families(context)
+        if not families:
+            raise MeshError("none of the selected objects has levels: generate some, or export all")
+        keys = {str(level.get(level_info.PROFILE, "")) for family in families for level in family.levels}
         key = self.profile
         if key == "levels":
             if len(keys) > 1:
                 raise MeshError("these levels were made for several profiles: choose one")
             key = next(iter(keys & set(PROFILES)), "plain")
-        for source in sources:
-            if reason := PROFILES[key].why_not(len(level_info.levels_of(source))):
-                raise MeshError(f"'{source.name}': {reason}")
-        groups = groups_of(sources, PROFILES[key].name, PROFILES[key].hull_name)
-        if not groups:
-            raise MeshError("none of the selected objects has levels: generate some, or export all")
-        return groups, key
+        for family in families:
+            if reason := PROFILES[key].why_not(len(family.levels)):
+                raise MeshError(f"'{family.name}': {reason}")
+        return groups_of(families, PROFILES[key].name, PROFILES[key].hull_name), key
 
-    def _sources(self, context: bpy.types.Context) -> list[bpy.types.Object]:
+    def _families(self, context: bpy.types.Context) -> list[level_info.Family]:
         from ..bridge.lod_sources import meshes_behind
 
-        things = bpy.data.objects if self.which == "ALL" else [context.active_object, *context.selected_objects]
-        found = meshes_behind(obj for obj in things if obj is not None)
-        return [obj for obj in found if level_info.levels_of(obj)]
+        if self.which == "ALL":
+            return level_info.families()
+        return level_info.families(meshes_behind(chosen_objects(context)))
 
     def _stale_notes(self, context: bpy.types.Context) -> list[str]:
-        stale = [obj.name for obj in self._sources(context) if level_info.stale_ones(level_info.levels_of(obj))]
+        stale = [family.name for family in self._families(context) if level_info.stale_ones(family.levels)]
         return [f"Edited since: {', '.join(stale)}; update the levels, then export again"] if stale else []
 
     def _refused(self, error: Exception) -> set[str]:

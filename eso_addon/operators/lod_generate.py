@@ -12,7 +12,7 @@ from ..jobs.modal import EngineOperator
 from ..jobs.worker import Steps
 from ..settings.lod_options import LodOptions
 from ..settings.profiles import PROFILES
-from .lod_polls import why_not_generate
+from .lod_polls import chosen_objects, why_not_generate
 from .polls import poll_with
 from .reports import notes_of, tell
 
@@ -72,7 +72,7 @@ class OBJECT_OT_eso_lod_generate(EngineOperator, LodOptions, bpy.types.Operator)
 
     def finish(self, context: bpy.types.Context, result: "list[Chain]") -> None:
         """Write the levels as objects, the finest first."""
-        from ..bridge.lod_sources import name_meshes, told_of, write_chains
+        from ..bridge.lod_sources import has_group, name_meshes, told_of, write_chains
         from ..bridge.place_levels import place_levels
 
         place_of = {place.source: place for place in self._places}
@@ -80,9 +80,9 @@ class OBJECT_OT_eso_lod_generate(EngineOperator, LodOptions, bpy.types.Operator)
         names_of = [place_of[source.objects[0]].names for source in self._sources]
         written = write_chains(self._sources, result, names_of, self._settings.writing)
         for source, chain, levels, names in zip(self._sources, result, written, names_of, strict=True):
-            settings = level_info.settings_text(
-                self._settings.stored([len(level.result.faces) for level in chain.levels])
-            )
+            settings = level_info.settings_text(self._settings.stored(
+                [len(level.result.faces) for level in chain.levels], with_group=has_group(source, self._settings.group)
+            ))
             for obj in source.objects:
                 objects.leave_edit_mode(obj)
                 own = [told_of(level, obj, settings, self.profile) for level in levels]
@@ -101,7 +101,7 @@ class OBJECT_OT_eso_lod_generate(EngineOperator, LodOptions, bpy.types.Operator)
     def _chosen(self, context: bpy.types.Context) -> list[bpy.types.Object]:
         if self.scope == "COLLECTION":
             return list(_collection(context, self.source_collection).all_objects)
-        return [obj for obj in (context.active_object, *context.selected_objects) if obj is not None]
+        return chosen_objects(context)
 
     def _tell(self, context: bpy.types.Context, chains: "list[Chain]") -> None:
         lines = []

@@ -10,7 +10,7 @@ from ..bridge import level_info, objects
 from ..bridge.level_names import check_free
 from ..core.errors import MeshError
 from ..settings.profiles import PROFILES
-from .lod_polls import why_not_update
+from .lod_polls import chosen_objects, why_not_update
 from .polls import poll_with
 from .reports import tell
 
@@ -38,35 +38,33 @@ class OBJECT_OT_eso_lod_hulls(bpy.types.Operator):
         """Replace the hulls that are there."""
         from ..bridge.lod_sources import meshes_behind
 
-        chosen = meshes_behind([obj for obj in [context.active_object, *context.selected_objects] if obj is not None])
-        sources = {obj: level_info.levels_of(obj) for obj in chosen}
-        sources = {obj: levels for obj, levels in sources.items() if levels}
+        families = level_info.families(meshes_behind(chosen_objects(context)))
         try:
-            if not sources:
+            if not families:
                 raise MeshError("none of the selected objects has levels: generate some first")
-            made = [hull for obj, levels in sources.items() for hull in self._replace(obj, levels[0])]
+            made = [hull for family in families for hull in self._replace(family)]
         except MeshError as error:
             self.report({"ERROR"}, str(error)[:1].upper() + str(error)[1:])
             return {"CANCELLED"}
         faces = sum(objects.triangle_count(hull) for hull in made)
-        tell(self, context, f"Collision hulls of {next(iter(sources)).name}", [f"{len(made)} hulls",
-                                                                              f"{faces:,} triangles"])
+        tell(self, context, f"Collision hulls of {families[0].name}",
+             [f"{len(made)} hulls", f"{faces:,} triangles"])
         return {"FINISHED"}
 
-    def _replace(self, source: bpy.types.Object, finest: bpy.types.Object) -> list[bpy.types.Object]:
+    def _replace(self, family: level_info.Family) -> list[bpy.types.Object]:
         from ..bridge.hulls import add_hulls
         from ..bridge.place_levels import remove_with_mesh
 
+        finest, old = family.levels[0], family.hulls
         profile = PROFILES.get(str(finest.get(level_info.PROFILE, "")), PROFILES["plain"])
-        old = level_info.hulls_of(source)
         if not profile.hull:
             raise MeshError(f"{profile.label} has no names for collision hulls: make the levels for an engine that has")
-        check_free([profile.hull_name(source.name, 1)], old)
+        check_free([profile.hull_name(family.name, 1)], old)
         names = {hull: hull.name for hull in old}
         for hull in old:
             hull.name = "eso_lod old hull"
         try:
-            made = add_hulls(source, finest, source.name, profile.hull_name, self.kind)
+            made = add_hulls(family.source or finest, finest, family.name, profile.hull_name, self.kind)
         except MeshError:
             for hull, name in names.items():
                 hull.name = name

@@ -7,11 +7,16 @@ from ..bridge import level_info
 from .polls import why_not_simplify
 
 
+def chosen_objects(context: bpy.types.Context) -> list[bpy.types.Object]:
+    """List the active object and the selected ones."""
+    return list(dict.fromkeys(obj for obj in (context.active_object, *context.selected_objects) if obj is not None))
+
+
 def why_not_generate(context: bpy.types.Context) -> str:
     """Say why no levels can be made; empty if they can, as far as can be told before a scope is chosen."""
     if context.mode not in {"OBJECT", "EDIT_MESH"}:
         return "Switch to Object Mode or Edit Mode first"
-    chosen = [obj for obj in (context.active_object, *context.selected_objects) if obj is not None]
+    chosen = chosen_objects(context)
     if context.mode == "OBJECT" and any(map(_can_have_levels, chosen)):
         return ""
     if context.mode == "OBJECT" and context.active_object is None and _has_meshes(context.collection):

@@ -10,6 +10,8 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty
 
 from ..bridge import level_info
+from ..bridge.copies import follow_modifiers
+from ..bridge.fingerprint import has_same_modifiers
 from ..core.errors import MeshError
 from ..core.steps import scaled
 from ..jobs.modal import EngineOperator
@@ -48,7 +50,7 @@ class OBJECT_OT_eso_lod_update(EngineOperator, bpy.types.Operator):
 
     def prepare(self, context: bpy.types.Context) -> "Steps[list[Chain]]":
         """Read the sources of the levels, those with the same settings and the same mesh together."""
-        from ..bridge.lod_sources import read_sources
+        from ..bridge.lod_sources import has_group, read_sources
         from ..settings.lod_record import LodSettings
 
         self._sources = []
@@ -60,6 +62,11 @@ class OBJECT_OT_eso_lod_update(EngineOperator, bpy.types.Operator):
             level = level_info.levels_of(group[0])[0]
             settings = LodSettings.read(level_info.settings_of(level))
             read = read_sources(group, apply_modifiers=settings.apply_modifiers, live_types=settings.live)
+            for source in read:
+                if settings.group and not has_group(source, settings.group):
+                    raise MeshError(f"'{source.objects[0].name}' has no vertex group "
+                                    f"'{settings.group['vertex_group']}' any more, which its levels were made with: "
+                                    "bring the name back, or generate them anew")
             self._sources += [(source, settings) for source in read]
         return self._steps()
 
@@ -80,6 +87,8 @@ class OBJECT_OT_eso_lod_update(EngineOperator, bpy.types.Operator):
                 for level in level_info.levels_of(obj):
                     made = own[min(level[level_info.LEVEL], len(own) - 1)]
                     put_mesh(level, made.mesh)
+                    if not has_same_modifiers(obj, str(level.get(level_info.HASH, ""))):
+                        follow_modifiers(level, obj, modifiers_applied=settings.apply_modifiers, live=source.live)
                     for key, value in made.properties.items():
                         if key != level_info.LEVEL:
                             level[key] = value

@@ -20,6 +20,9 @@ if TYPE_CHECKING:
     from ..core.levels import SimplifyResult
 
 
+_LIVE = {"ARMATURE"}
+
+
 class SimplifyReading(EngineOperator, SimplifyOptions):
     """What Simplify and the level slider share: read the active mesh, run the engine or replay its last run."""
 
@@ -35,13 +38,25 @@ class SimplifyReading(EngineOperator, SimplifyOptions):
         reason = objects.why_not_in_place(self._object) if self.in_place else ""
         if reason:
             raise MeshError(reason)
-        self._live = live_modifiers(self._object, {"ARMATURE"}) if self.apply_modifiers else []
+        if self.in_place and self.all_users and self.apply_modifiers:
+            self._check_users()
+        self._live = live_modifiers(self._object, _LIVE) if self.apply_modifiers else []
         self._source = read_mesh(self._object, apply_modifiers=self.apply_modifiers, live=self._live, carry=True,
                                  selection=self.only_selected and self._object.mode == "EDIT")
         targets, regions = self._asked()
         arrays = self._source.vertices, self._source.triangles
         options = {**self.engine_options(), **self._source.carried, **regions}
         return with_errors_if_run(replayed_steps(*arrays, targets=targets, options=options))
+
+    def _check_users(self) -> None:
+        """Refuse to put modifiers into a mesh that others show through modifiers of their own."""
+        from ..bridge.alike import alike
+
+        users = [self._object, *(obj for obj in bpy.data.objects if obj.data == self._object.data != obj)]
+        first, *others = alike(dict.fromkeys(users), apply_modifiers=True, live_types=_LIVE)
+        if others:
+            raise MeshError(f"'{others[0][0].name}' shows the mesh through other modifiers than '{first[0].name}': "
+                            "turn All Users or Apply Modifiers off")
 
     def _asked(self) -> tuple[dict[str, Any], dict[str, Any]]:
         """Give the target, and the engine's options for parts that are treated apart."""

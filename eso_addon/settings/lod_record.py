@@ -59,9 +59,9 @@ class LodSettings:
         except TypeError:
             raise MeshError("these levels do not say how they were made: generate them anew") from None
 
-    def stored(self, counts: Sequence[int]) -> dict[str, Any]:
-        """Give the settings for one mesh to be stored; of a budget, its share."""
-        data = asdict(self)
+    def stored(self, counts: Sequence[int], *, with_group: bool = True) -> dict[str, Any]:
+        """Give the settings for one mesh to be stored; of a budget, its share; the group only if the mesh has it."""
+        data = asdict(self) if with_group else asdict(self) | {"group": {}}
         return data | {"kind": "count", "values": list(counts)} if self.kind == "budget" else data
 
     def goals(self) -> Goals:

@@ -3,6 +3,7 @@
 # mypy: disable-error-code="valid-type"
 """The options of the engine as Blender properties, once, for the panel and for the operators; words as in the API."""
 
+from inspect import get_annotations
 from typing import TYPE_CHECKING, Any
 
 import bpy
@@ -200,3 +201,12 @@ class SimplifyOptions(EngineOptions, KeepOptions, ScreenOptions):
     def expected_triangles(self, now: int) -> int | None:
         """Give the triangles that the target asks for, None if only the engine can tell."""
         return {"ratio": round(now * self.ratio), "count": min(now, self.faces_target)}.get(self.target)
+
+
+def option_names(*classes: type) -> list[str]:
+    """List the names of all options that classes define, each once, what they build on first."""
+    found: dict[str, None] = {}
+    for one in classes:
+        for base in reversed(one.__mro__):
+            found.update(dict.fromkeys(get_annotations(base)))
+    return list(found)

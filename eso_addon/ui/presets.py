@@ -8,13 +8,14 @@ from bl_operators.presets import AddPresetBase
 from bl_ui.utils import PresetPanel
 
 from ..settings.level_sets import LEVEL_SETS
+from ..settings.lod_options import LodOptions
+from ..settings.options import SimplifyOptions, option_names
 from ..settings.preset_path import unknown_folders
 
 SUBDIRECTORY = "eso_lod"
-_VALUES = (
-    "target", "ratio", "faces_target", "max_error", "preset", "method", "rings", "placement", "refit", "weld", "prune",
-    "apply_modifiers", "levels_by", "ratios", "faces_targets", "max_errors",
-)  # fmt: skip
+# Settings about one object, or about one place in one file.
+_NOT_KEPT = {"vertex_group", "scope", "source_collection", "collection"}
+_VALUES = [name for name in option_names(SimplifyOptions, LodOptions) if name not in _NOT_KEPT]
 
 
 class _PresetMenu:

@@ -76,6 +76,61 @@ def arrays(obj: bpy.types.Object) -> tuple[np.ndarray, np.ndarray]:
     return positions, np.array([t.vertices for t in mesh.loop_triangles], np.int64).reshape(-1, 3)
 
 
+def add_scaling_nodes(*objects: bpy.types.Object) -> None:
+    """Give objects a Geometry Nodes modifier whose input scales the mesh; see `set_scale`."""
+    tree = bpy.data.node_groups.new("Scale", "GeometryNodeTree")
+    for way in ("INPUT", "OUTPUT"):
+        tree.interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")
+    tree.interface.new_socket("Scale", in_out="INPUT", socket_type="NodeSocketFloat")
+    start, end = tree.nodes.new("NodeGroupInput"), tree.nodes.new("NodeGroupOutput")
+    scale = tree.nodes.new("GeometryNodeTransform")
+    tree.links.new(start.outputs["Geometry"], scale.inputs["Geometry"])
+    tree.links.new(start.outputs["Scale"], scale.inputs["Scale"])
+    tree.links.new(scale.outputs["Geometry"], end.inputs["Geometry"])
+    for obj in objects:
+        obj.modifiers.new("Scale", "NODES").node_group = tree
+        set_scale(obj, 1.0)
+
+
+def set_scale(obj: bpy.types.Object, scale: float) -> None:
+    """Set what `add_scaling_nodes` scales an object by."""
+    modifier = obj.modifiers["Scale"]
+    name = next(socket.identifier for socket in modifier.node_group.interface.items_tree if socket.name == "Scale")
+    bpy.context.view_layer.update()  # since Blender 5.2 it makes the inputs
+    if bpy.app.version < (5, 2):
+        modifier[name] = scale
+    else:
+        getattr(modifier.properties.inputs, name).value = scale
+    obj.update_tag()
+    bpy.context.view_layer.update()
+
+
+def add_empty(name: str) -> bpy.types.Object:
+    """Add an empty."""
+    empty = bpy.data.objects.new(name, None)
+    bpy.context.scene.collection.objects.link(empty)
+    return empty
+
+
+def add_twin(obj: bpy.types.Object, name: str) -> bpy.types.Object:
+    """Add an object that shares another's mesh, without its modifiers."""
+    twin = bpy.data.objects.new(name, obj.data)
+    bpy.context.scene.collection.objects.link(twin)
+    bpy.context.view_layer.update()
+    return twin
+
+
+def add_rig(name: str = "Rig") -> bpy.types.Object:
+    """Add an armature of one bone, called Bone, that points up."""
+    rig = bpy.data.objects.new(name, bpy.data.armatures.new(name))
+    bpy.context.scene.collection.objects.link(rig)
+    activate(rig)
+    bpy.ops.object.mode_set(mode="EDIT")
+    rig.data.edit_bones.new("Bone").tail = (0, 0, 1)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    return rig
+
+
 def _named(name: str) -> bpy.types.Object:
     obj = bpy.context.object
     obj.name = obj.data.name = name

@@ -240,6 +240,32 @@ def test_bad_requests_write_nothing(tmp_path: Path, options: dict, words: str) -
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.parametrize("which", ["ALL", "SELECTED"])
+def test_levels_whose_source_is_gone(tmp_path: Path, which: str) -> None:
+    two_balls("unreal", "0.5, 0.2")
+    bpy.ops.object.eso_lod_hulls()
+    for name in ("Ball", "Other"):
+        bpy.data.objects.remove(bpy.data.objects[name])
+    activate(bpy.data.objects["Ball_LOD1"])
+    bpy.ops.object.eso_lod_hulls()  # around the finest, since nothing else is left
+    export(filepath=str(tmp_path / "levels.fbx"), which=which)
+    tree = children_of(read_fbx(tmp_path / "levels.fbx"))
+    wanted = ["Ball", "Other"] if which == "ALL" else ["Ball"]
+    for name in wanted:
+        assert tree[name] == [f"{name}_LOD0", f"{name}_LOD1"]
+    assert sorted(tree[""]) == [*wanted, *(f"UCX_{name}_LOD0_01" for name in wanted)]
+
+
+def test_levels_that_an_instance_shows(tmp_path: Path) -> None:
+    two_balls("godot", "0.5")
+    empty = bpy.data.objects.new("Here", None)
+    empty.instance_type, empty.instance_collection = "COLLECTION", bpy.data.collections["Ball_LODs"]
+    bpy.context.scene.collection.objects.link(empty)
+    activate(empty)
+    export(filepath=str(tmp_path / "levels.glb"))
+    assert [node["name"] for node in gltf_of(tmp_path / "levels.glb")["nodes"]] == ["Ball_LOD0"]
+
+
 def test_no_levels() -> None:
     two_balls("plain", "0.5")
     activate(add_cube())

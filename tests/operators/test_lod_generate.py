@@ -9,7 +9,7 @@ from eso_addon.bridge import lod_sources
 from eso_addon.bridge.read_mesh import read_mesh
 from eso_addon.core.mesh import MeshError
 from eso_addon.core.simplify import lod_chain
-from tests.bridge.blender_scenes import activate, add_sphere, arrays, linked_from_library
+from tests.bridge.blender_scenes import activate, add_empty, add_sphere, arrays, linked_from_library
 
 pytestmark = pytest.mark.usefixtures("addon")
 generate = bpy.ops.object.eso_lod_generate
@@ -164,6 +164,44 @@ def test_instances_of_a_collection_get_levels_once() -> None:
     assert len(bpy.data.meshes) == 3
 
 
+def test_instances_within_instances_are_in_every_level() -> None:
+    inner, outer = bpy.data.collections.new("Inner"), bpy.data.collections.new("Outer")
+    for collection, name in ((inner, "One"), (outer, "Other")):
+        ball = add_sphere(name, 2)
+        collection.objects.link(ball)
+        bpy.context.scene.collection.objects.unlink(ball)
+    nested, top = bpy.data.objects.new("Nested", None), add_empty("Top")
+    nested.instance_type, nested.instance_collection, nested.location.z = "COLLECTION", inner, 4
+    outer.objects.link(nested)
+    top.instance_type, top.instance_collection = "COLLECTION", outer
+    bpy.context.view_layer.update()
+    for ratios in ("0.5", "0.5, 0.25"):
+        activate(top)
+        generate(ratios=ratios)
+    activate(bpy.data.objects["Top_LOD0"])  # which stands for its source
+    generate(ratios="0.5, 0.25")
+    shown = [(i.object.name, i.parent.name) for i in bpy.context.evaluated_depsgraph_get().object_instances
+             if i.is_instance and i.object.type == "MESH"]
+    assert sorted(shown) == [("One", "Top"), ("One_LOD0", "Top_LOD0"), ("One_LOD1", "Top_LOD1"),
+                             ("Other", "Top"), ("Other_LOD0", "Top_LOD0"), ("Other_LOD1", "Top_LOD1")]
+    assert bpy.data.objects["Nested_LOD1"].location.z == 4
+    assert "Nested_LOD1" not in bpy.context.scene.objects
+    nested.location.z = 5
+    activate(top)
+    generate(ratios="0.5, 0.25")
+    assert bpy.data.objects["Nested_LOD1"].location.z == 5
+
+
+def test_a_level_whose_source_is_gone_can_have_levels() -> None:
+    obj = add_sphere()
+    generate(ratios="0.5, 0.25")
+    bpy.data.objects.remove(obj)
+    for _ in range(2):
+        activate(bpy.data.objects["Ball_LOD0"])
+        generate(ratios="0.5")
+        assert sorted(o.name for o in bpy.data.objects) == ["Ball_LOD0", "Ball_LOD0_LOD0", "Ball_LOD1"]
+
+
 def test_a_budget_over_forty_props() -> None:
     props = []
     for number in range(40):
@@ -223,11 +261,7 @@ def test_what_poses_stays_live_and_the_rest_is_applied() -> None:
     activate(obj)
     generate(ratios="0.5", live_mirror=True)
     assert level["eso_triangles"] == 160
-    activate(obj)
-    level.modifiers.clear()
-    bpy.data.objects.remove(level)
-    generate(ratios="0.5", live_mirror=True)
-    assert [modifier.name for modifier in level_objects()[0].modifiers] == ["Half", "Rig"]
+    assert [modifier.name for modifier in level.modifiers] == ["Half", "Rig"]
     assert [modifier.show_viewport for modifier in obj.modifiers] == [True] * 3
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from eso_addon.bridge.hulls import MOST_CORNERS, convex_hull
 from eso_addon.core.mesh import MeshError
-from tests.bridge.blender_scenes import activate, add_cube, add_mesh, add_sphere, arrays
+from tests.bridge.blender_scenes import activate, add_cube, add_empty, add_mesh, add_sphere, arrays
 
 pytestmark = pytest.mark.usefixtures("addon")
 generate = bpy.ops.object.eso_lod_generate
@@ -77,6 +77,20 @@ def test_flat_things_and_engines_without_hulls_are_refused() -> None:
     generate(ratios="1", profile="unity")
     with pytest.raises(RuntimeError, match="Unity has no names"):
         add()
+
+
+def test_a_hull_stands_where_constraints_put_its_source() -> None:
+    obj, target = add_sphere(subdivisions=3), add_empty("Target")
+    target.location.x = 5
+    obj.constraints.new("COPY_LOCATION").target = target
+    activate(obj)
+    generate(ratios="0.5", profile="unreal")
+    activate(obj)
+    add()
+    for x in (5, 7):
+        target.location.x = x
+        bpy.context.view_layer.update()
+        assert [round(thing.matrix_world.translation.x, 5) for thing in (obj, *hulls())] == [x, x]
 
 
 def test_a_flat_hull_leaves_no_mesh_behind() -> None:

@@ -167,6 +167,27 @@ def test_levels_without_readable_settings() -> None:
         update(only_stale=False)
 
 
+@pytest.mark.parametrize("use", ["protect", "favour"])
+def test_a_vertex_group_that_is_gone_is_missed(use: str) -> None:
+    one, other = add_sphere("One", 3), add_sphere("Other", 3)
+    group = one.vertex_groups.new(name="Face")
+    group.add([vertex.index for vertex in one.data.vertices if vertex.co.z > 0], 1.0, "REPLACE")
+    activate(one, other)
+    generate(ratios="0.6", vertex_group="Face", group_use=use)
+    group.name = "Head"
+    edit(one)
+    edit(other)
+    before = [level.data for level in levels()]
+    with pytest.raises(RuntimeError, match="'One' has no vertex group 'Face' any more.*generate them anew"):
+        update()
+    assert [level.data for level in levels()] == before
+    activate(other)
+    update(which="SELECTED")  # which never had it
+    group.name = "Face"
+    update()
+    assert [level["eso_stale"] for level in levels()] == [False, False]
+
+
 def test_without_levels() -> None:
     add_mesh("Plain", [(0, 0, 0), (1, 0, 0), (0, 1, 0)], [(0, 1, 2)])
     with pytest.raises(RuntimeError, match="No levels"):

@@ -8,7 +8,7 @@ import pytest
 
 from eso_addon.bridge.read_mesh import read_mesh
 from eso_addon.core.simplify import simplify
-from tests.bridge.blender_scenes import activate, add_cube, add_mesh, add_sphere, arrays, linked_from_library
+from tests.bridge.blender_scenes import activate, add_cube, add_mesh, add_sphere, add_twin, arrays, linked_from_library
 
 pytestmark = pytest.mark.usefixtures("addon")
 simplify_active = bpy.ops.object.eso_simplify
@@ -73,6 +73,30 @@ def test_in_place_on_a_shared_mesh(all_users: bool) -> None:
     other = bpy.data.objects.new("Other", obj.data)
     simplify_active(ratio=0.25, in_place=True, all_users=all_users)
     assert (other.data == obj.data) == all_users
+
+
+def test_in_place_for_all_users_takes_the_modifiers_of_all() -> None:
+    obj = add_sphere(subdivisions=3)
+    other = add_twin(obj, "Other")
+    for user in (obj, other):
+        user.modifiers.new("Row", "ARRAY").count = 2
+    simplify_active(ratio=0.5, in_place=True, all_users=True)
+    bpy.context.view_layer.update()
+    assert other.data == obj.data
+    assert [user.dimensions.x for user in (obj, other)] == pytest.approx([4, 4], rel=0.05)
+
+
+def test_in_place_for_all_users_needs_the_same_modifiers() -> None:
+    obj = add_sphere(subdivisions=3)
+    other = add_twin(obj, "Other")
+    obj.modifiers.new("Row", "ARRAY").count = 2
+    mesh = obj.data
+    with pytest.raises(RuntimeError, match="'Other' shows the mesh through other modifiers than 'Ball'"):
+        simplify_active(ratio=0.5, in_place=True, all_users=True)
+    assert mesh == obj.data == other.data
+    simplify_active(ratio=0.5, in_place=True, all_users=True, apply_modifiers=False)
+    assert obj.data == other.data != mesh
+    assert len(obj.modifiers) == 1
 
 
 def test_an_error_target_is_in_the_scenes_units() -> None:

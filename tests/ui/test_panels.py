@@ -12,7 +12,7 @@ from eso_addon import settings as settings_package
 from eso_addon.core.errors import MeshError
 from eso_addon.settings.level_list import MOST
 from eso_addon.settings.level_text import TEXT_OF
-from eso_addon.ui import menus, panels
+from eso_addon.ui import menus, panels, presets
 from tests.bridge.blender_scenes import activate, add_cube, add_sphere, linked_from_library
 
 
@@ -174,6 +174,27 @@ def test_rows_hold_large_numbers_and_drop_no_levels() -> None:
     rows = [name for kind, name, _ in drawn_by(panels.VIEW3D_PT_eso_levels) if (kind, name) == ("prop", "row_ratio")]
     assert len(rows) == MOST
     assert "+ 1" in labels(panels.VIEW3D_PT_eso_levels)
+
+
+@pytest.mark.parametrize("text", ["inf", "nan, 100", "-inf", "1e400", "100, x"])
+@pytest.mark.parametrize("kind", ["ratio", "count", "error", "screen", "budget"])
+def test_rows_of_what_is_no_number_are_left_out(kind: str, text: str) -> None:
+    settings = bpy.context.scene.eso_lod
+    settings.levels_by = kind
+    setattr(settings, TEXT_OF[kind], text)
+    assert list(getattr(settings, f"row_{kind}"))[1:] == [0] * 7
+    assert drawn_by(panels.VIEW3D_PT_eso_levels)
+    add_sphere()
+    with pytest.raises(RuntimeError, match="(?i)cannot be read|write numbers|number"):
+        bpy.ops.object.eso_lod_generate(levels_by=kind, **{TEXT_OF[kind]: text})
+
+
+def test_a_preset_holds_the_whole_panel_but_for_what_is_of_one_file() -> None:
+    kept = {value.removeprefix("settings.") for value in presets.SCENE_OT_eso_preset_add.preset_values}
+    shown = {name for name in bpy.context.scene.eso_lod.bl_rna.properties.keys()  # noqa: SIM118 - no dictionary
+             if not name.startswith("row_")} - {"rna_type", "name"}
+    assert shown - kept == {"vertex_group", "scope", "source_collection", "collection"}
+    assert kept <= shown
 
 
 def test_figures_stand_beside_the_levels_before_and_after() -> None:
