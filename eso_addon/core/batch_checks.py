@@ -12,6 +12,8 @@ from .quadrics import Components, cross
 
 # no face may shrink to less than this part of its area: flat meshes would fill with faces without any
 _SLIVER = 1e-3
+# below it single precision rounds more and more
+_LEAST = np.finfo(np.float32).tiny
 # of each corner that stays, its collapse and the next vertex; of those at a boundary, also the previous one
 _Links = tuple[Ints, Ints, Ints, Ints]
 
@@ -69,7 +71,8 @@ def _flips(state: State, touched: Touched) -> Ints:
     corner, label = touched.corner, touched.label
     old = _normals(state.before, corner)
     flipped = np.flatnonzero(turned(state, old, _normals(state.after, corner)) & (touched.gone == NONE))
-    found = [label.take(flipped, axis=1).max(axis=0, initial=-1)]
+    alone = label.take(flipped, axis=1).max(axis=0, initial=-1)
+    found = [alone.compress(alone >= 0)]  # a face that has not changed is no one's, whatever rounding says
     # faces of several collapses pass through states in between
     own_labels = label.take(touched.mixed, axis=1)
     last = np.minimum(own_labels.max(axis=0, initial=-1), touched.gone.take(touched.mixed)).view(np.uint64)
@@ -84,12 +87,16 @@ def _flips(state: State, touched: Touched) -> Ints:
 
 
 def turned(state: State, old: Components, new: Components) -> Bools:
-    """Tell the faces that turn or shrink too far, by the components of their normals before and after."""
+    """Tell the faces that turn or shrink too far, by the components of their normals before and after.
+
+    Those so small that the squares of their areas vanish are as good as none.
+    """
     turn = old[0] * new[0] + old[1] * new[1] + old[2] * new[2]
     was, becomes = (side[0] * side[0] + side[1] * side[1] + side[2] * side[2] for side in (old, new))
     least = state.rules.flip
     needed = np.maximum(np.float32(least * abs(least)) * becomes, np.float32(_SLIVER**2) * was)
-    return (turn * np.abs(turn) <= needed * was) & (was > 0)
+    needed *= was
+    return (turn * np.abs(turn) <= needed) & (needed > _LEAST)
 
 
 def _normals(rows: np.ndarray, corner: Ints) -> tuple:

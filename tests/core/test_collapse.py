@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import threading
 from itertools import pairwise
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 from eso_addon.core.adjacency import corner_fans, vertex_components
+from eso_addon.core.batch_checks import turned
 from eso_addon.core.blocks import Blocks
 from eso_addon.core.collapse import Rules, collapse_steps
 from eso_addon.core.mesh import MeshError
@@ -269,3 +271,12 @@ def test_may_be_closed_at_any_time(steps_done: int) -> None:
     assert threading.active_count() == before
     for array, copy in zip((mesh.points, mesh.faces), given_arrays, strict=True):
         assert_array_equal(array, copy)  # the input is not touched
+
+
+@given(st.floats(-25, 8), st.floats(-1, 0.99), st.integers(0, 2**32 - 1))
+def test_a_face_that_stays_as_it_is_has_not_turned(digits: float, flip: float, seed: int) -> None:
+    """Of any size: the squares of small ones vanish in single precision."""
+    normals = (np.random.default_rng(seed).normal(size=(3, 50)) * 10.0**digits).astype(np.float32)
+    state = SimpleNamespace(rules=SimpleNamespace(flip=flip))
+    with np.errstate(under="ignore"):
+        assert not turned(state, tuple(normals), tuple(normals)).any()

@@ -7,9 +7,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 
+from eso_addon.core.adjacency import face_neighbors
 from eso_addon.core.attributes import Attribute
 from eso_addon.core.deviation import measure
-from eso_addon.core.refit import _face_neighbors
 from eso_addon.core.reinsertion import reinsert, spare_vertices
 from eso_addon.core.simplify import lod_chain, simplify
 
@@ -31,7 +31,7 @@ def test_a_face_or_a_side_is_split(face: int, weights: list[float]) -> None:
     point = np.array(weights) @ corners
     out = point - TETRAHEDRON.mean(axis=0)
     point += 0.1 * out
-    made = reinsert(TETRAHEDRON, FACES, _face_neighbors(FACES, 4), point[:, None], np.array([0.01]), np.array([face]),
+    made = reinsert(TETRAHEDRON, FACES, face_neighbors(FACES, 4), point[:, None], np.array([0.01]), np.array([face]),
                     np.array(weights)[:, None], 1, np.ones((3, 4), bool))
     assert len(made.faces) == 6
     assert sides(made.faces) == {(b, a) for a, b in sides(made.faces)}

@@ -77,6 +77,20 @@ def shared_places(vertices: Floats, faces: Ints, loose: Ints) -> bool:
 
 
 @QUICK
+@given(SEEDS, st.floats(0.02, 1.0), OPTIONS, st.floats(1.0, 9.0))
+def test_needles_and_specks_are_no_hindrance(seed: int, ratio: float, options: dict[str, Any], digits: float) -> None:
+    """As Booleans leave them: faces whose squared areas single precision does not hold."""
+    rng = np.random.default_rng(seed)
+    vertices, faces = shapes.noisy(shapes.torus(16, 20), rng, 0.05)
+    for face in faces[rng.choice(len(faces), 60)]:
+        corners = face[: rng.integers(2, 4)]  # a needle or a speck
+        middle = vertices[corners].mean(axis=0)
+        vertices[corners] = middle + (vertices[corners] - middle) * 10.0 ** -rng.uniform(0.5, digits)
+    result = simplify(vertices, faces, ratio=ratio, **options)
+    assert_valid(vertices, faces, result, flips=may_flip(options))
+
+
+@QUICK
 @given(SEEDS, st.floats(0.02, 1.0), OPTIONS)
 @example(233191, 0.15, {"preset": "paper"})
 def test_manifolds_reach_the_count_or_say_so(seed: int, ratio: float, options: dict[str, Any]) -> None:
