@@ -162,7 +162,7 @@ def test_wire_and_settings(page: Page, site: Start) -> None:
     page.goto(site().url)
     until(page, "s.identical && s.shown === s.faces")
     page.locator("eso-viewer >> css=.wire").click()
-    page.wait_for_function("document.querySelector('eso-viewer').view.meshes[0].wire?.drawRange.count === 30000")
+    until(page, "document.querySelector('eso-viewer').view.meshes[0].wire?.drawRange.count === 30000")
     page.locator("eso-viewer >> css=[name=wire]").press("Enter")  # sends no form
     page.locator("eso-viewer >> css=[name=wire]").press("Space")
     assert page.evaluate("document.querySelector('eso-viewer').view.root.children[0].children[0].visible") is False
@@ -203,7 +203,7 @@ def test_keys_and_mouse_move_the_camera(page: Page, site: Start) -> None:
     turned = page.evaluate(SEAT)
     assert turned != home
     page.mouse.wheel(0, 100)
-    page.wait_for_function(f"{SEAT}[2] > {turned[2]}")
+    until(page, f"{SEAT}[2] > {turned[2]}")
     page.mouse.dblclick(300, 200)
     assert page.evaluate(SEAT) == home
     assert page.evaluate(target) == center
