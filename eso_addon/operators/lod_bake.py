@@ -10,6 +10,7 @@ from bpy.props import EnumProperty, FloatProperty, IntProperty
 
 from ..bridge import level_info, objects
 from ..core.errors import MeshError
+from ..jobs.refusal import refuse
 from ..settings.profiles import PROFILES
 from .lod_polls import chosen_objects, why_not_update
 from .polls import poll_with
@@ -57,8 +58,7 @@ class OBJECT_OT_eso_lod_bake(bpy.types.Operator):
             pairs = self._pairs(context)
             images = [bake_normals(fine, level, self.size, self._reach(level), self.samples) for fine, level in pairs]
         except MeshError as error:
-            self.report({"ERROR"}, str(error)[:1].upper() + str(error)[1:])
-            return {"CANCELLED"}
+            return refuse(self, error)
         seconds = time.perf_counter() - start
         tell(self, context, "Baked normals", [*(image.name for image in images), f"{seconds:.1f} s"])
         return {"FINISHED"}

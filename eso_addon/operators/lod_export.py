@@ -11,6 +11,7 @@ from bpy.props import BoolProperty, EnumProperty, StringProperty
 
 from ..bridge import level_info
 from ..core.errors import MeshError
+from ..jobs.refusal import refuse
 from ..settings.profiles import PROFILES
 from .lod_polls import chosen_objects, why_not_update
 from .polls import poll_with
@@ -52,7 +53,7 @@ class OBJECT_OT_eso_lod_export(bpy.types.Operator):
         try:
             groups, key = self._groups(context)
         except MeshError as error:
-            return self._refused(error)
+            return refuse(self, error)
         if not self.filepath:
             folder = Path(bpy.data.filepath).parent if bpy.data.filepath else Path.home()
             name = bpy.path.clean_name(groups[0].base) if groups else "levels"
@@ -78,7 +79,7 @@ class OBJECT_OT_eso_lod_export(bpy.types.Operator):
             ending = path.suffix.lower()
             export_levels(path, groups, profile.layout, write_stage if ending == ".blend" else WRITERS[ending])
         except (MeshError, OSError, RuntimeError) as error:
-            return self._refused(error)
+            return refuse(self, error)
         counts = {"object": len(groups), "level": sum(len(group.levels) for group in groups),
                   "hull": sum(len(group.hulls) for group in groups)}
         lines = [f"{count} {name}{'s' if count > 1 else ''}" for name, count in counts.items() if count]
@@ -125,11 +126,6 @@ class OBJECT_OT_eso_lod_export(bpy.types.Operator):
     def _stale_notes(self, context: bpy.types.Context) -> list[str]:
         stale = [family.name for family in self._families(context) if level_info.stale_ones(family.levels)]
         return [f"Edited since: {', '.join(stale)}; update the levels, then export again"] if stale else []
-
-    def _refused(self, error: Exception) -> set[str]:
-        text = " ".join(str(error).split())
-        self.report({"ERROR"}, text[:1].upper() + text[1:])
-        return {"CANCELLED"}
 
 
 OPERATOR = OBJECT_OT_eso_lod_export

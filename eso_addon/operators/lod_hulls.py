@@ -9,6 +9,7 @@ from bpy.props import EnumProperty
 from ..bridge import level_info, objects
 from ..bridge.level_names import check_free
 from ..core.errors import MeshError
+from ..jobs.refusal import refuse
 from ..settings.profiles import PROFILES
 from .lod_polls import chosen_objects, why_not_update
 from .polls import poll_with
@@ -44,8 +45,7 @@ class OBJECT_OT_eso_lod_hulls(bpy.types.Operator):
                 raise MeshError("none of the selected objects has levels: generate some first")
             made = [hull for family in families for hull in self._replace(family)]
         except MeshError as error:
-            self.report({"ERROR"}, str(error)[:1].upper() + str(error)[1:])
-            return {"CANCELLED"}
+            return refuse(self, error)
         faces = sum(objects.triangle_count(hull) for hull in made)
         tell(self, context, f"Collision hulls of {families[0].name}",
              [f"{len(made)} hulls", f"{faces:,} triangles"])
