@@ -32,7 +32,7 @@ def is_part_selected(mesh: bpy.types.Mesh) -> bool:
 def marked_selection(obj: bpy.types.Object) -> Iterator[None]:
     """Mark the selected faces of an object in Edit Mode by an attribute."""
     edited = bmesh.from_edit_mesh(obj.data)
-    layers = edited.faces.layers.bool
+    layers = edited.faces.layers.int  # before 4.3 there are no booleans
     layer = layers.get(MARK) or layers.new(MARK)
     try:
         for face in edited.faces:  # in Edit Mode Blender has no quicker way
@@ -40,7 +40,7 @@ def marked_selection(obj: bpy.types.Object) -> Iterator[None]:
         _store(obj)
         yield
     finally:
-        edited.faces.layers.bool.remove(edited.faces.layers.bool[MARK])
+        edited.faces.layers.int.remove(edited.faces.layers.int[MARK])
         _store(obj)
 
 
@@ -59,10 +59,10 @@ def marked_faces(mesh: bpy.types.Mesh) -> NDArray[np.bool_]:
         The modifiers do not tell, or leave nothing of them.
     """
     mark = mesh.attributes.get(MARK)
-    if mark is None or mark.domain != "FACE" or mark.data_type != "BOOLEAN":
+    if mark is None or mark.domain != "FACE" or mark.data_type != "INT":
         raise MeshError("modifiers do not tell which faces come from the selected ones: "
                         "apply them first, or turn Only Selected off")
-    selected = read_attribute(mesh, MARK)
-    if selected is None or not selected.any():
+    marks = read_attribute(mesh, MARK)
+    if marks is None or not marks.any():
         raise MeshError("modifiers leave nothing of the selected faces: select others, or turn Only Selected off")
-    return selected
+    return marks != 0
