@@ -59,6 +59,7 @@ function begin(element) {
   let frames = [];
   let lastFrame = 0;
   let looking;
+  let telling;
 
   const worker = makeWorker({ url: new URL(source, document.baseURI).href, wish: { ...settings, cap } });
   const post = (action, wishes, ports = []) => worker.postMessage([action, wishes], ports);
@@ -131,7 +132,7 @@ function begin(element) {
       if (state.message !== message) panel.message(state.message, true);
       if (state.failed && !failed) say('failed', { text: state.message });
       if (state.seconds && !seconds) say('whole', figures);
-      tell();
+      telling ||= setTimeout(tell, 80); // each time the page is laid out and painted anew
     },
   };
 
@@ -201,6 +202,8 @@ function begin(element) {
   // -- what is told ------------------------------------------------------------------------------------------------
 
   function tell() {
+    clearTimeout(telling);
+    telling = 0;
     const { shown, there, faces, identical, quantised, seconds, failed, waiting } = state;
     let text = shown ? 'refining' : 'loading';
     if (seconds) text = '';
