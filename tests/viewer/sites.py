@@ -88,5 +88,6 @@ def until(page: Any, condition: str, seconds: float = 40) -> dict[str, Any]:  # 
 
 
 def words(page: Any, selector: str) -> str:  # noqa: ANN401
-    """Give the text of something in the viewer."""
-    return page.locator(f"eso-viewer >> css={selector}").inner_text()
+    """Give the text of something in the viewer, once it is written: that happens every 80 ms at most."""
+    read = "async (node) => { await new Promise((done) => setTimeout(done, 100)); return node.innerText; }"
+    return page.locator(f"eso-viewer >> css={selector}").evaluate(read)
