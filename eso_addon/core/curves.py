@@ -8,14 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .guard import hold_flips
-from .mesh import bounds
-
-Bools = NDArray[np.bool_]
 Floats = NDArray[Any]
 Ints = NDArray[np.int64]
 
-_THIN = 1e-5  # of the mesh: lines that leave a plane of two axes by less are meant to lie in it
 _GAUSS = 0.5 - 0.5 / np.sqrt(3)  # where two samples of an edge integrate cubics along it
 
 
@@ -82,59 +77,3 @@ class Curves:
         edge, second = np.zeros(len(self._counts), np.int64), np.zeros(len(self._counts))
         edge[sample.take(won)], second[sample.take(won)] = self._candidates.take(won), share.take(won)
         return edge, np.stack((1 - second, second))
-
-
-def planar_edges(points: Floats, edges: Ints) -> Bools:
-    """Tell along which axes edges lie in a plane of the two others, each together with one beside it: (3, e) bool.
-
-    Parameters
-    ----------
-    points : (3, n) float64
-    edges : (2, e) int64
-    """
-    low, high = bounds(points.T)
-    leaves = np.abs(points.take(edges[1], axis=1) - points.take(edges[0], axis=1)) > _THIN * (high - low).max(initial=0)
-    straight = np.ones(points.shape, bool)
-    for flags, out in zip(straight, leaves, strict=True):
-        flags[edges.compress(out, axis=1)] = False
-    return ~leaves & straight.take(edges, axis=1).any(axis=1)
-
-
-def into_planes(vertices: Floats, faces: Ints, points: Floats, borders: Ints, vertex_map: Ints) -> tuple[Floats, Bools]:
-    """Put vertices of borders that run in a plane of two axes back into it, so that mirrored halves and tiles fit.
-
-    A vertex stands for the edges that end in what has become it: it lies where those do that are planar along an axis,
-    if all these agree. Where a face would turn it does not.
-
-    Parameters
-    ----------
-    vertices, faces : (k, 3) float64 and (m, 3) int64
-        The simplified mesh.
-    points : (3, n) float64
-        The original's.
-    borders : (2, e) int64
-    vertex_map : (n,) int64
-        The simplified vertex that each has become, below zero if none.
-
-    Returns
-    -------
-    vertices : (k, 3) float64
-    held : (k, 3) bool
-        The coordinates that must stay.
-    """
-    planar, ends = planar_edges(points, borders), points.take(borders, axis=1)
-    # each edge tells both of its ends between which coordinates it lies
-    owner = vertex_map.take(borders).ravel()
-    order = np.argsort(owner, kind="stable")[np.count_nonzero(owner < 0):]
-    chosen, begin = np.unique(owner.take(order), return_index=True)
-    edge = order % max(borders.shape[1], 1)
-    low = np.minimum.reduceat(np.where(planar, ends.min(axis=1), np.inf).take(edge, axis=1), begin, axis=1).T
-    high = np.maximum.reduceat(np.where(planar, ends.max(axis=1), -np.inf).take(edge, axis=1), begin, axis=1).T
-    first, last = bounds(points.T)
-    held, goal = np.zeros(vertices.shape, bool), vertices.copy()
-    held[chosen] = (low <= high) & (high - low <= _THIN * (last - first).max(initial=0))
-    goal[chosen] = goal[chosen].clip(low, high)
-    step, share = np.where(held, goal - vertices, 0), np.ones(len(vertices))
-    hold_flips(vertices, step, share, faces, vertices, np.flatnonzero(step.any(axis=1).take(faces).any(axis=1)))
-    held &= (share == 1)[:, None]
-    return np.where(held, goal, vertices + share[:, None] * step), held

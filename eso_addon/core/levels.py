@@ -9,9 +9,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from .border_planes import into_planes
 from .carrier import Carrier
 from .closest import ClosestPoints
-from .curves import into_planes
 from .mesh import Floats, Ints
 from .options import Options
 from .prepare import Prepared

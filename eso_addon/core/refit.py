@@ -104,7 +104,7 @@ def refit(vertices: Floats, faces: Ints, original_vertices: Floats, original_fac
         held[ends[ends >= 0]] = False
     held = np.repeat(held[:, None], 3, axis=1)
     if fixed is not None:
-        held |= fixed.reshape(len(fixed), -1)
+        held |= fixed if fixed.ndim == 2 else fixed[:, None]
     flat = not face_area_vectors(original_vertices, original_faces).any()
     if len(faces) == 0 or rounds < 1 or flat or (held.all() and not flips):
         return Refitted.unfitted(vertices.copy(), faces)

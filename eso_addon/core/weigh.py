@@ -4,7 +4,7 @@
 import numpy as np
 
 from .attribute_quadrics import with_attributes
-from .curves import planar_edges
+from .border_planes import planar_edges
 from .guidance import Guidance
 from .lines import MATERIAL, Lines
 from .mesh import Floats
